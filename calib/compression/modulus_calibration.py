@@ -20,6 +20,7 @@ from calib.compression.press import (
     solver_error,
     unit_curve,
 )
+from calib.compression.report import write_report
 from calib.compression.result import (
     Assumptions,
     CompressionResult,
@@ -31,7 +32,6 @@ from calib.compression.result import (
     SmallStrainModulus,
     SpecimenSizes,
     StressCurves,
-    read_curves,
     write_result,
 )
 from calib.errors import CurveError
@@ -208,12 +208,7 @@ def calibrate_modulus(
             git=git_commit(),
         )
         write_result(result, _curves(measured, found), out)
-        from reports.press.compression import write_report
-        from reports.press.stress_strain import write_figure
-
-        curves = read_curves(out)
-        write_figure(result, curves, out)
-        write_report(result, curves, out)
+        write_report(out)
         return result
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from calib.calibration.result_parts import Conditioning
 from calib.io.folder import write_json
@@ -124,6 +124,10 @@ class InSampleCut:
         knife: Knife as it was simulated.
         predictive_width: Mean width of that band over the measured peak; null where the fit ended too early.
         conditioning: How the record became a curve over the stroke; missing in older documents.
+        mach: Blade speed over the P-wave speed; missing in older documents.
+        speed_real_m_s: Real speed of the knife that was given [m/s]; missing where none was.
+        scene: All numbers of the simulated scene, in the layout of the solver's own classes, which is no part of this
+            document's contract; missing in older documents.
     """
 
     trace: CutSource
@@ -143,6 +147,9 @@ class InSampleCut:
     knife: Annotated[Knife, Shared("knife")]
     predictive_width: NotNegative | None = field(default=None, metadata=NULL)
     conditioning: Conditioning | None = None
+    mach: Positive | None = None
+    speed_real_m_s: float | None = None
+    scene: Mapping[str, Any] | None = None
 
     @classmethod
     def of(cls, cut: FittedCut) -> InSampleCut:
@@ -167,6 +174,9 @@ class InSampleCut:
             knife=knife,
             predictive_width=None if cut.band is None else mean_width(cut.band, cut.metrics),
             conditioning=Conditioning.of(cut.setup.curve, cut.setup.bandwidth),
+            mach=cut.scene.motion.mach,
+            speed_real_m_s=cut.setup.request.speed,
+            scene=cut.scene.as_dict(),
         )
 
 
@@ -298,6 +308,9 @@ class StudyResult:
         wall_s: Run time [s].
         invocation: How it was called.
         software: What was run.
+        correlations: Posterior correlation of two parameters, by "one,other"; missing where the fit ended too early,
+            and in older documents.
+        discrepancy: How far the fit lets a right model be from a trace, part of the peak; missing in older documents.
     """
 
     DOCUMENT: ClassVar = "study"
@@ -322,6 +335,8 @@ class StudyResult:
     wall_s: NotNegative
     invocation: Invocation = field(metadata=FLAT)
     software: Software = field(metadata=FLAT)
+    correlations: Mapping[str, Annotated[float, keywords(minimum=-1, maximum=1)]] | None = None
+    discrepancy: Fraction | None = None
 
 
 def write_result(result: StudyResult, folder: Path) -> None:

@@ -20,7 +20,7 @@ from calib.io.wording import listed
 from calib.material.food import FoodSpec
 from calib.material.food_file import dump_material
 from calib.material.form import known_of
-from calib.material.properties import MEANINGS, property_of
+from calib.material.properties import property_of
 from calib.material.remarks import notes
 from calib.multi_specimen.compression_modulus import CompressionModulus, compression_modulus
 from calib.multi_specimen.fitted_cuts import FittedCut, fitted_cuts
@@ -127,6 +127,8 @@ class Finished:
             wall_s=wall_s,
             invocation=Invocation(study.seed, study.first.arch, study.first.command),
             software=Software.here(),
+            correlations=self._correlations(),
+            discrepancy=next(iter(self.setups.values())).request.errors.discrepancy,
         )
 
     def _parameters(self) -> dict[str, StudyParameter]:
@@ -140,6 +142,14 @@ class Finished:
                 known = replace(known, status="measured", source=_pressed(self.moduli, known.source))
             out[p.name] = StudyParameter.of_study(found, known, shared=is_shared(p.name))
         return out
+
+    def _correlations(self) -> dict[str, float] | None:
+        """Posterior correlation of each pair of parameters; None where the fit ended too early."""
+        names, analysis = self.fit.result.parameters.names, self.fit.analysis
+        if analysis is None:
+            return None
+        matrix = analysis.uncertainty.correlation
+        return {f"{names[i]},{names[j]}": float(matrix[i, j]) for i in range(len(names)) for j in range(i)}
 
     def _limits(self) -> list[str]:
         """What the study does not show, one sentence each."""
@@ -205,7 +215,7 @@ def _pressed(moduli: Sequence[CompressionModulus], before: str) -> str:
 
 def _write(done: Finished, out: Path, began: float) -> StudyResult:
     """Write curves-NAME.csv, material.yaml, summary.json and report.pdf; returns what summary.json holds."""
-    from reports.multi_specimen.report import write_report
+    from calib.multi_specimen.report import write_report
 
     for name in done.setups:
         write_csv(out / f"curves-{name}.csv", done.curves(name))
@@ -215,7 +225,7 @@ def _write(done: Finished, out: Path, began: float) -> StudyResult:
     provenance = {"passed": result.passed, "git": software.git, "versions": software.versions}
     dump_material(done.food(), out / "material.yaml", {"study": result.study, "traces": hashes, **provenance})
     write_result(result, out)
-    write_report(out, MEANINGS)
+    write_report(out)
     return result
 
 

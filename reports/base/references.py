@@ -6,7 +6,10 @@ A text cites by name, ``[@Nairn 2003]``; once the whole text is known, numbers t
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Any
+
+from reports.base.format import breakable
 
 #: What the reports cite, by name.
 REFERENCES: dict[str, str] = {
@@ -38,8 +41,13 @@ REFERENCES: dict[str, str] = {
     "Koh 2026": "Koh, H., Song, C.-Y., Choi, Y., Viveiros, M., Hyde, D., Kim, H. (2026). CulinaryCut-VLAP: a "
     "vision-language-action-physics framework for food cutting via a force-aware material point method. "
     "arXiv:2601.06451",
+    "Dawood 2026": "Dawood et al. (2026). Hyperelastic characterisation of silicone tissue phantoms. Data, CC BY 4.0.",
     "Gneiting 2007": "Gneiting, T., Raftery, A. E. (2007). Strictly proper scoring rules, prediction, and estimation. "
     "J. Am. Stat. Assoc. 102:359-378. doi:10.1198/016214506000001437",
+    "ASME V&V 20": "ASME V&V 20 (2009). Standard for verification and validation in computational fluid dynamics and "
+    "heat transfer. American Society of Mechanical Engineers.",
+    "ASME V&V 40": "ASME V&V 40 (2018). Assessing credibility of computational modeling through verification and "
+    "validation: application to medical devices. American Society of Mechanical Engineers.",
     "ISO 18571": "ISO/TS 18571 (2014). Road vehicles: objective rating metric for non-ambiguous signals.",
     "Schwer 2007": "Schwer, L. E. (2007). Validation metrics for response histories. Eng. Comput. 23:295-309. "
     "doi:10.1007/s00366-007-0070-1",
@@ -50,7 +58,17 @@ REFERENCES: dict[str, str] = {
     "Sobol 2001": "Sobol, I. M. (2001). Global sensitivity indices for nonlinear mathematical models. Math. Comput. "
     "Simul. 55:271-280. doi:10.1016/S0378-4754(00)00270-6",
 }
+#: References of foods that the reports cite as well, by their short names in materials.yaml.
+CITED_TOO = {"CulinaryCut": "Koh 2026"}
 _CITED = re.compile(r"\[@([^]]+)\]")
+
+
+def of_foods(found: Mapping[str, str]) -> list[list[str]]:
+    """The references of foods as rows: short name, and full text; one that is in the numbered list has its number."""
+    return [
+        [breakable(name), breakable(f"[@{CITED_TOO[name]}] {text}" if name in CITED_TOO else text)]
+        for name, text in found.items()
+    ]
 
 
 class Citations:

@@ -40,6 +40,7 @@ def credibility(folder: Path) -> Data | None:
     found = read_json(path)
     try:
         return {
+            "standards": ["[@ASME V&V 20]", "[@ASME V&V 40]"],
             "factor": f"{found['coverage_factor']:g}",
             "rows": [[label, *_row(found[key], found["coverage_factor"])] for key, label in VALUES.items()],
             "context": [[capital(label), breakable(found[key])] for key, label in CONTEXT.items()],

@@ -30,6 +30,7 @@ LABELS = 14.0  # title and numbers of the axes, of a picture's height [mm]
 LEAST = 18.0  # of one picture of several in a row [mm]
 AXIS = 14.0  # numbers and label at the left of a picture [mm]
 SCALE = 18.0  # scale of colours at the right, of a picture's width [mm]
+BESIDE = (1.05, 0.0, 0.06, 0.94)  # place of a glance's scale: as tall as the picture with its pointed end, of its sizes
 
 
 Glance = Callable[[Axes], None]
@@ -125,6 +126,7 @@ def glance(section: Section, knife: Knife, height: float, stroke: np.ndarray, fo
         axes.set(xlabel="across the blade [mm]", ylabel="height [mm]")
         axes.set_title(f"largest force, {1e3 * float(section.stroke[k]):.1f} mm", loc="right")
         axes.grid(visible=False)
-        axes.figure.colorbar(colour, ax=axes, location="right", aspect=20, extend="max", label="von Mises stress [kPa]")
+        scale = axes.inset_axes(BESIDE)
+        axes.figure.colorbar(colour, cax=scale, extend="max", label="von Mises stress [kPa]")
 
     return draw

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from mpm.scene.material import PARTS_BEFORE_IT_FLOWS, REFERENCE_SPEED, Material
 from mpm.scene.motion import SLOWED_FROM
-from reports.base.format import breakable, count, listed, plain, quantity
+from reports.base.format import count, listed, plain, quantity
+from reports.base.references import of_foods
 from reports.base.run_folder import Data
 from reports.calibration import model_sketch
 
@@ -54,6 +55,12 @@ ABBREVIATIONS = (
     ("Sprague–Geers M, P, C", "errors of magnitude and phase, and both combined [@Schwer 2007]"),
     ("95 % band, interval", "of the posterior: literature's ranges and trace together, unless *trace alone* is said"),
     ("±", "one standard uncertainty"),
+    (
+        "Kind of source",
+        "of a literature value, not of a fitted one: *measured*, on this food in a test of the kind that is meant; "
+        "*proxy*, another food, another test, a derived or a second-hand value; *assumed*, nobody's measurement; "
+        "*paper, Table 2*, of the CulinaryCut paper [@Koh 2026], no better value found",
+    ),
 )
 
 
@@ -76,7 +83,7 @@ def model(result: CalibrationResult) -> Data:
         "objective": _objective(result),
         "limit_sources": _limit_sources(names),
         "abbreviations": [[name, text + more.get(name, "")] for name, text in ABBREVIATIONS],
-        "food_references": [[breakable(name), breakable(text)] for name, text in result.references.items()],
+        "food_references": of_foods(result.references),
     }
 
 
@@ -270,8 +277,12 @@ def _speed(result: CalibrationResult) -> str:
     E, nu, rho = (_value(result, name) for name in ("E", "nu", "rho"))
     if None not in (E, nu, rho) and cut.mach is not None:
         at = cut.mach * Material(E=E, nu=nu, rho=rho).p_wave
-        real = cut.speed_real_m_s or trace.stroke_m / (trace.end_s - trace.onset_s)
-        said += f", {quantity(at, 'm/s', digits=2)}, where the trace has {quantity(real, 'm/s', digits=2)} on average"
+        said += f", {quantity(at, 'm/s', digits=2)}"
+        real = cut.speed_real_m_s
+        if real is None and trace is not None:
+            real = trace.stroke_m / (trace.end_s - trace.onset_s)
+        if real is not None:
+            said += f", where the trace has {quantity(real, 'm/s', digits=2)} on average"
     end = _part(result, "motion", "end_speed")
     if end is not None and end < 1.0:
         below, least = (quantity(x, "fraction", digits=None) for x in (SLOWED_FROM, end))

@@ -65,7 +65,7 @@ INTERRUPTED = (
 )
 USE = "for simulating cuts of this food with this knife; the values are constants of the simulation, fitted to one cut"
 #: Parts that cite, in the order in which they are read.
-CITING = ("model", "withdrawal", "influence_caption")
+CITING = ("model", "withdrawal", "influence_caption", "credibility")
 RELATIONS = {"<=": "≤ ", ">=": "≥ "}
 
 

@@ -3,84 +3,111 @@ ranges come from."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from mpm.scene import Knife
-from reports.base.format import DASH, breakable, compared, count, interval, plain, quantity, uncertain
-from reports.base.labels import in_words, source_in_words
+from reports.base.format import DASH, breakable, compared, count, listed, plain, quantity, uncertain
+from reports.base.labels import in_words
 from reports.base.references import Citations
 from reports.base.run_folder import Data
+from reports.calibration import model_page
+from reports.multi_specimen.parameters import apart, how_far, priors
+from reports.multi_specimen.shown_cut import Cited, Known, as_calibration
+from reports.multi_specimen.verdicts import HELD_OUT
 
-METHOD = (
-    "The food is a three-dimensional continuum. Particles carry it and exchange momentum through a regular grid of "
-    "cells (moving least squares material point method [@Hu 2018], quadratic kernels). There is no artificial damping, "
-    "no scaling of mass, and no clamp on a force or a strain. The blade is rigid and goes down at one speed; the board "
-    "is rigid."
+NOT_SAID = "What was simulated is not said in this document, which is of an older version."
+STUDY = (
+    "In a study the sum is over all fitted cuts, each with one factor on its force, lognormal about 1; tare, drift, "
+    "lag and bandwidth are integrated out of the curve [@Kennedy 2001]."
 )
-LAWS = (
-    ("Elasticity", "fixed-corotated, isotropic [@Stomakhin 2012]", "E, nu, rho"),
-    ("Flow", "von Mises, no hardening", "yield_stress"),
-    ("Loss", "Kelvin–Voigt, the loss factor at the first axial mode", "loss_factor"),
-    (
-        "Crack",
-        "on the blade's plane alone [@Nairn 2003]: ties that soften linearly [@Hillerborg 1976]; their work per area "
-        "is part of R",
-        "strength_ratio, R",
-    ),
-    (
-        "Edge",
-        "line force: starts at the resistance of skin or flesh, then needs what the opening has left of R "
-        "[@Atkins 2009]",
-        "R_skin, initiation_depth, R",
-    ),
-    ("Faces", "unilateral contact (Nitsche [@Chouly 2013]), Coulomb friction up to the shear yield stress", "mu"),
+PRESSED = "The prior of E is the literature's range times what the compression tests say of it."
+TERMS = (
+    ("Prior", "what was known before these cuts: the literature's range, for E with the study's compression tests"),
+    ("Held out", "not in the fit whose flesh predicts it; *in-sample*: of a cut that was fitted"),
 )
-LAYERS = ("Layers", "rind and core have a size, a resistance and a stiffness of their own", "R_rind, R_core")
-OBJECTIVE = (
-    "The fit minimises one sum over all fitted cuts: squared residuals of curve and peak, whitened, and of the "
-    "parameters against the literature's ranges (central 95 % of normal priors, of the logarithm for stresses and "
-    "resistances). Each cut has one factor on its force, lognormal about 1; tare, drift, lag and bandwidth are "
-    "integrated out of the curve [@Kennedy 2001]. Intervals are profile likelihoods whose ends were simulated "
-    "[@Raue 2009]. NRMSE is the root mean square difference of two curves over the measured peak; the ISO rating "
-    "follows [@ISO 18571]."
-)
-FIXED = "Values that were not fitted are in material.yaml of the same folder, each with its source."
+#: Where the limits of a held-out cut come from, and of those of a fitted one what is other than in a calibration.
+HELD_SOURCES = {
+    "nrmse": "sensors of such traces are uncertain by 10 % and more",
+    "rating": "from 0.8 on the standard calls an agreement good [@ISO 18571]",
+    "inside": "a right band holds 95 % of many curves' points, and of one curve, whose points hang together, now and "
+    "then less: 90 % is chosen here",
+    "width": "a band wider than a quarter of the peak either way predicts nothing of use",
+}
+TIGHTER = "chosen here: less than the 10 % of a prediction, because the values were fitted to this very curve"
+FITTED_SOURCES = {"curve error (NRMSE)": TIGHTER, "normalised-shape error": TIGHTER}
 BASELINES = {"constant": "constant", "linear": "line", "zero": "nothing", "air": "air run"}
 
 
 def model(
     s: Data,
     curves: Mapping[str, Mapping[str, np.ndarray]],
-    limit_sources: Mapping[str, str],
+    known: Known,
+    cited: Cited,
 ) -> Data:
     """What the report prints of the model.
 
     Args:
         s: ``summary.json``.
         curves: Columns of the curves of each cut, each (n,): stroke [m], forces [N].
-        limit_sources: Where the limit of each line of a verdict comes from.
+        known: What the folder says of food and records.
+        cited: What gives the references that sources name.
 
     Returns:
         Sentences and rows by name.
     """
-    layered = any(name.startswith(("R_rind", "R_core")) for name in s["parameters"])
+    shown = shown_cut(s, curves)
+    page: Data = {} if shown is None else model_page.model(as_calibration(s, shown, known, cited))
     citations = Citations()
     content: Data = citations.numbered(
         {
-            "method": METHOD,
+            "shown": "" if shown is None else breakable(shown),
+            "method": page.get("method", NOT_SAID),
+            "conditions": page.get("conditions", []),
             "cuts": [_cut(name, s, columns) for name, columns in curves.items()],
-            "laws": [[part, law, names] for part, law, names in (*LAWS, *([LAYERS] if layered else []))],
+            "steps": _steps(known),
+            "laws": page.get("laws", []),
             "conditioning": [row for name in curves if (row := _conditioning(name, s))],
-            "objective": OBJECTIVE,
-            "fixed": FIXED,
-            "limit_sources": _limit_sources(s, limit_sources),
-            "ranges": _ranges(s["parameters"]),
-            "presses": [_press(press) for press in (s.get("presses") or {}).values()],
+            "objective": " ".join(text for text in (page.get("objective", ""), STUDY, _pressed(s)) if text),
+            "limit_sources": _limit_sources(s),
+            "ranges": priors(s, known),
+            "abbreviations": [*page.get("abbreviations", []), *([name, text] for name, text in TERMS)],
+            "presses": [_press(press, s) for press in (s.get("presses") or {}).values()],
+            "food_references": page.get("food_references", []),
         }
     )
     return {**content, "references": citations.listed}
+
+
+def shown_cut(s: Data, curves: Iterable[str]) -> str | None:
+    """The cut whose model is shown, the first that was fitted; None where no document says what was simulated."""
+    return next((n for n in curves if {"shape", "knife", "dx_m"} <= set(s["traces"].get(n) or {})), None)
+
+
+def sketch(s: Data, curves: Iterable[str], known: Known) -> bytes | None:
+    """The sketch of the cut that is shown.
+
+    Args:
+        s: ``summary.json``.
+        curves: Names of the cuts, in their order.
+        known: What the folder says of food and records.
+
+    Returns:
+        An SVG document; None where no document says what was simulated.
+    """
+    shown = shown_cut(s, curves)
+    return None if shown is None else model_page.sketch(as_calibration(s, shown, known, lambda sources: {}))
+
+
+def _steps(known: Known) -> str:
+    """The time steps of each fitted cut, in words; empty where no record says them."""
+    said = [f"{plain(1e6 * x.dt)} µs in {name} ({count(x.steps)} steps)" for name, x in known.stored.items()]
+    return breakable(f"Time step: {listed(said)}.") if said else ""
+
+
+def _pressed(s: Data) -> str:
+    return PRESSED if s.get("presses") and "E" in s["parameters"] else ""
 
 
 def _of(name: str, s: Data) -> Data:
@@ -134,35 +161,26 @@ def _conditioning(name: str, s: Data) -> list[str]:
     ]  # fmt: skip
 
 
-def _limit_sources(s: Data, sources: Mapping[str, str]) -> list[list[str]]:
-    """Lines of the verdicts that share a reason for their limit, and the reason."""
-    names = {v["name"] for cut in (*s["traces"].values(), *s["hold_out"].values()) for v in cut.get("verdicts") or []}
-    if any(cut["limits"].get("width") is not None for cut in s["hold_out"].values()):
-        names.add("width of the 95 % band")
+def _limit_sources(s: Data) -> list[list[str]]:
+    """Lines of the verdicts that share a reason for their limit, and the reason; held-out and fitted cuts apart."""
     grouped: dict[str, list[str]] = {}
-    for name, why in sources.items():
-        if name in names:
-            grouped.setdefault(why, []).append(name)
-    return [["; ".join(lines), why] for why, lines in grouped.items()]
+    held: Data = next((cut["limits"] for cut in s["hold_out"].values()), {})
+    for key, (words, unit) in HELD_OUT.items():
+        if held.get(key) is not None:
+            limit = f"{words}{quantity(held[key], unit, digits=None)} of a held-out cut"
+            grouped.setdefault(HELD_SOURCES[key], []).append(limit)
+    lines = {v["name"] for cut in (*s["traces"].values(), *s["hold_out"].values()) for v in cut.get("verdicts") or []}
+    for name, why in {**model_page.LIMIT_SOURCES, **FITTED_SOURCES}.items():
+        if name in lines:
+            grouped.setdefault(why, []).append(f"{name} of a fitted cut" if name in FITTED_SOURCES else name)
+    return [["; ".join(names), why] for why, names in grouped.items()]
 
 
-def _press(press: Data) -> list[str]:
-    """Name, modulus, its uncertainty, repeats, Poisson's ratio and files of a compression test."""
+def _press(press: Data, s: Data) -> list[str]:
+    """Name, modulus, its uncertainty, repeats, Poisson's ratio, the fit's modulus, and files of a compression test."""
     files = "; ".join(f"{breakable(file['name'])}, SHA-256 {file['sha256'][:16]}" for file in press["files"])
+    far = apart(s).get(press["name"])
     return [
         breakable(press["name"]), quantity(press["E"], "Pa"), quantity(press["spread"], "fraction", digits=2),
-        count(press["repeats"]), plain(press["nu"], None), files,
+        count(press["repeats"]), plain(press["nu"], None), DASH if far is None else f"{how_far(far)} it", files,
     ]  # fmt: skip
-
-
-def _ranges(parameters: Data) -> list[list[str]]:
-    """Where the literature's range of each property comes from, each once."""
-    found: dict[tuple[str, ...], str] = {}
-    for name, p in parameters.items():
-        ends, source = (
-            interval(p["prior_low"], p["prior_high"], p["unit"]),
-            source_in_words(p.get("source") or "", " of materials.yaml"),
-        )
-        if source:
-            found.setdefault((name.split("@")[0], ends, in_words(p.get("status") or ""), source), name)
-    return [[breakable(row[0]), *row[1:]] for row in found]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
@@ -17,12 +17,13 @@ from mpm.output.section import Section
 from mpm.scene import Knife
 from reports import ReportError
 from reports.base.figures import BLACK, BLUE, MEASURED, SIMULATED, next_to, predictive, stroke_axis, svg
-from reports.base.format import breakable, count, duration, interval, listed, publish, quantity
+from reports.base.format import breakable, count, duration, listed, publish, quantity
 from reports.base.labels import as_sentence, in_type, in_words
 from reports.base.run_folder import Data, check_kind, read_columns, read_date, read_json, read_section
-from reports.calibration import cut_figure, measurement, model_page
-from reports.multi_specimen import verdicts
-from reports.multi_specimen.model import model
+from reports.calibration import cut_figure, measurement, parameter_figures, parameter_page
+from reports.multi_specimen import parameters, verdicts
+from reports.multi_specimen.model import model, sketch
+from reports.multi_specimen.shown_cut import Cited, Known, read_known
 from reports.web.calibration import write_page
 from reports.web.study import study_page
 
@@ -30,13 +31,6 @@ PREDICTED: dict[str, Any] = {"color": BLUE, "lw": 1.8, "dashes": (1.4, 1.2)}
 FIGURE_HEIGHT = 60.0  # of the figure of a trace [mm]
 BESIDE_HEIGHT = 78.0  # with the food under the blade beside it [mm]
 MORE_HEIGHT = 22.0  # added on the first page [mm]
-SIZES = {
-    "length": "size of the specimen across the blade",
-    "width": "size of the specimen along the blade",
-    "height": "height of the specimen",
-}
-"""What a fitted size is, in words."""
-
 _NUM, _OPT, _TEXT, _MAYBE = (int, float), (int, float, type(None)), (str,), (str, type(None))
 _METRICS: Data = {
     "nrmse shape_error peak_error work_error": _OPT,
@@ -60,6 +54,11 @@ SCHEMA: Data = {
 }  # fmt: skip
 
 
+def nothing_cited(sources: Iterable[str | None]) -> Mapping[str, str]:
+    """No reference for any source."""
+    return {}
+
+
 @dataclass(frozen=True)
 class FinishedStudy:
     """A finished study.
@@ -70,6 +69,8 @@ class FinishedStudy:
         curves: Columns of ``curves-NAME.csv`` by trace: stroke [m] and forces [N].
         sections: The food across the blade's middle, by trace; those that were fitted have one, but for older runs.
         meanings: What each property of the material is, in words.
+        known: What the folder says of food and records.
+        cited: What gives the references that sources name.
     """
 
     summary: Data
@@ -77,14 +78,17 @@ class FinishedStudy:
     curves: dict[str, dict[str, np.ndarray]]
     sections: dict[str, Section]
     meanings: Mapping[str, str] = field(default_factory=dict)
+    known: Known = field(default_factory=Known)
+    cited: Cited = nothing_cited
 
 
-def write_report(folder: Path, meanings: Mapping[str, str] | None = None) -> Path:
+def write_report(folder: Path, meanings: Mapping[str, str] | None = None, cited: Cited = nothing_cited) -> Path:
     """Write ``report.pdf`` and ``report.html`` of a finished study into its folder.
 
     Args:
         folder: Folder with ``summary.json`` and ``curves-NAME.csv`` of each trace.
         meanings: What each property of the material is, in words.
+        cited: What gives the references that sources name.
 
     Returns:
         Path of the PDF; the page lies beside it.
@@ -92,15 +96,23 @@ def write_report(folder: Path, meanings: Mapping[str, str] | None = None) -> Pat
     Raises:
         ReportError: A file is missing, damaged or incomplete, or the report cannot be written.
     """
-    done = read_study(Path(folder), meanings)
+    done = read_study(Path(folder), meanings, cited)
     figures = {name: picture(done, name) for name in done.curves}
     printed = content(done)
     target = Path(folder) / "report.pdf"
-    pictures = {f"trace{k}.svg": drawn for k, drawn in enumerate(figures.values())}
-    publish(target, "study.typ", printed, pictures, date=done.created)
+    pictures = {f"trace{k}.svg": drawn for k, drawn in enumerate(figures.values())} | _model_pictures(done)
+    publish(target, "study.typ", {**printed, "figures": list(pictures)}, pictures, date=done.created)
     page = study_page(printed, done.curves, list(done.summary["hold_out"]), figures)
     write_page(target.with_suffix(".html"), page)
     return target
+
+
+def _model_pictures(done: FinishedStudy) -> dict[str, bytes]:
+    """The sketch of the cut, and the correlations of more than two parameters, by file name."""
+    drawn = sketch(done.summary, done.curves, done.known)
+    names, matrix = parameters.correlations(done.summary)
+    found = {} if drawn is None else {"sketch.svg": drawn}
+    return found | ({"correlations.svg": parameter_figures.correlations(names, matrix)} if len(names) > 2 else {})
 
 
 def is_study(summary: Path) -> bool:
@@ -113,8 +125,16 @@ def is_study(summary: Path) -> bool:
     return isinstance(found, dict) and "study" in found
 
 
-def read_study(folder: Path, meanings: Mapping[str, str] | None = None) -> FinishedStudy:
+def read_study(folder: Path, meanings: Mapping[str, str] | None = None, cited: Cited = nothing_cited) -> FinishedStudy:
     """Read a study's folder.
+
+    Args:
+        folder: The folder.
+        meanings: What each property of the material is, in words.
+        cited: What gives the references that sources name.
+
+    Returns:
+        All that a report is made from.
 
     Raises:
         ReportError: A file is missing, damaged or incomplete.
@@ -132,7 +152,7 @@ def read_study(folder: Path, meanings: Mapping[str, str] | None = None) -> Finis
     curves = {n: read_columns(folder / f"curves-{n}.csv", complete, complete) for n in names}
     drawn = [n for n, t in summary["traces"].items() if "shape" in t and "sim_N" in curves[n]]
     looks = {n: look for n in drawn if (look := read_section(folder / f"record-{n}.h5")) is not None}
-    return FinishedStudy(summary, created, curves, looks, meanings or {})
+    return FinishedStudy(summary, created, curves, looks, meanings or {}, read_known(folder, summary["traces"]), cited)
 
 
 def _changed(path: Path) -> datetime:
@@ -196,6 +216,7 @@ def content(done: FinishedStudy) -> Data:
     each = [(_title(n, s, "held out"), p) for n, p in held.items()]
     each += [(_title(n, s, "in-sample"), t) for n, t in fitted.items()]
     reduced = s.get("reduced_chi2")
+    rows = [(parameters.parameter(n, p, done.meanings), p) for n, p in s["parameters"].items()]
     return {
         "food": s["food"].replace("_", " ").capitalize(),
         "study": breakable(Path(s["study"]).name),
@@ -203,6 +224,7 @@ def content(done: FinishedStudy) -> Data:
         "cutcal": str(s.get("versions", {}).get("cutcal", "")),
         "passed": s["passed"],
         "sentence": verdicts.sentence(s, {name: widths[name] for name in held}),
+        "conflicts": parameters.conflicts(s),
         "held": [verdicts.summary_line(name, p, widths[name]) for name, p in held.items()],
         "fitted": [verdicts.summary_line(n, t, verdicts.band_width(done.curves[n], False)) for n, t in fitted.items()],
         "held_limits": verdicts.held_limits(s),
@@ -218,12 +240,16 @@ def content(done: FinishedStudy) -> Data:
         "shown": list(done.curves).index(first(done)),
         "captions": [_caption(s, name) for name in done.curves],
         "left_open": [row for title, cut in each for row in _left_open(title, cut)],
-        "shared": [_parameter(n, p, done.meanings) for n, p in s["parameters"].items() if p.get("shared", True)],
-        "own": [_parameter(n, p, done.meanings) for n, p in s["parameters"].items() if not p.get("shared", True)],
+        "shared": [row for row, p in rows if p.get("shared", True)],
+        "own": [row for row, p in rows if not p.get("shared", True)],
+        "legend": parameters.legend(s),
+        "pair": parameter_page.pair(*parameters.correlations(s)),
+        "correlations": None if s.get("correlations") is None else parameter_page.correlations(s["correlations"]),
+        "fixed": parameters.fixed(s, done.known, done.meanings),
         "checks": [[breakable(name), in_words(c["name"]), *verdicts.change(c)] for name, t in fitted.items()
                    for c in t.get("numerical_checks") or []],
         "checks_note": verdicts.carried_on(s),
-        "model": model(s, done.curves, model_page.LIMIT_SOURCES),
+        "model": model(s, done.curves, done.known, done.cited),
         "traces": [[breakable(name), *_origin(_source(s, name))] for name in done.curves],
         "runs": _runs(s),
         "commit": s.get("git") or "",
@@ -262,16 +288,6 @@ def _caption(s: Data, name: str) -> str:
         f"Predicted with the flesh of {listed(held['trained_on'])}. "
         f"Fitted to this cut: {own}, and one factor on its force. {verdicts.peaks(held, 'predicted')}"
     )
-
-
-def _parameter(name: str, p: Data, meanings: Mapping[str, str]) -> list[str]:
-    """Property, meaning, value, intervals and verdict of a parameter, and the cut that has it for itself."""
-    unit, of, cut = p["unit"], *name.partition("@")[::2]
-    return [
-        breakable(of), meanings.get(of) or SIZES.get(of, ""), quantity(p["value"], unit),
-        interval(p["low95"], p["high95"], unit), interval(p["prior_low"], p["prior_high"], unit),
-        in_words(p["verdict"]), breakable(cut),
-    ]  # fmt: skip
 
 
 def _title(name: str, s: Data, how: str) -> str:

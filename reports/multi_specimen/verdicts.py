@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from reports.base.format import DASH, breakable, compared, listed, quantity
-from reports.base.labels import related, shown
+from reports.base.format import DASH, breakable, compared, listed, quantity, uncertain
+from reports.base.labels import LEAST_PART, related, shown
 from reports.base.run_folder import Data
 
 WIDE = 0.5
 """Mean width of a 95 % band over the measured peak from which on it tells little [-]: the limit of a calibration on one
 trace."""
 NRMSE, BAND_WIDTH = "curve error (NRMSE)", "width of the 95 % band"
+QUARTER, HALF_LISTED = "a quarter of the simulated speed", "Half the speed is listed as it was"
 IN_SAMPLE = {NRMSE: "NRMSE", "normalised-shape error": "shape", "peak force error": "peak"}
 """Lines of a fitted cut that are columns of the summary as well."""
 HELD_OUT = {
@@ -196,7 +197,13 @@ def change(c: Data) -> list[str]:
     """Change of peak and work by one numerical choice."""
     if c.get("reason"):
         return [f"broke down: {c['reason'].replace('_', ' ')}", ""]
-    return [quantity(c.get(key), "fraction", signed=True) for key in ("peak_change", "work_change")]
+    return [_part(c.get(key)) for key in ("peak_change", "work_change")]
+
+
+def _part(x: float | None) -> str:
+    """A change; one that two decimals do not show is said to be below them, whatever its sign."""
+    small = x is not None and abs(x) < LEAST_PART
+    return shown(abs(x), "fraction", 3) if small and x is not None else quantity(x, "fraction", signed=True)
 
 
 def carried_on(s: Data) -> str:
@@ -207,7 +214,9 @@ def carried_on(s: Data) -> str:
         for v in t.get("verdicts") or []
         if "extrapolated to rest" in (v.get("note") or "")
     ]
-    start = "Half and a quarter of the speed are listed as they were simulated. The verdict carries them on to rest: "
+    checks = {c["name"] for t in s["traces"].values() for c in t.get("numerical_checks") or []}
+    listed_ = "Half and a quarter of the speed are listed as they were" if QUARTER in checks else HALF_LISTED
+    start = f"{listed_} simulated. The verdict carries the change on to rest: "
     return breakable(start + "; ".join(said) + ".") if said else ""
 
 
@@ -223,15 +232,8 @@ def factor_row(name: str, cut: Data, meaning: str) -> list[str]:
         Cells: cut, name, meaning, before, after, and ``yes``, ``no`` or a dash.
     """
     found: Any = (cut.get("nuisances") or {}).get("scale")
-    factor = quantity(cut["factor"], "-")
+    factor = cut["factor"]
     if found is None:
-        return [breakable(name), "Factor", meaning, "not recorded", factor, DASH]
-    before, after = (_ends(x, found[sd]) for x, sd in ((0.0, "prior_sd"), (float(np.log(cut["factor"])), "sd")))
-    known = "no" if found["outside"] else "yes"
-    return [breakable(name), "Factor", meaning, f"{before} (95 %)", f"{factor} ({after})", known]
-
-
-def _ends(log: float, sd: float) -> str:
-    """The 95 % interval of a factor whose logarithm is normal."""
-    low, high = (quantity(float(np.exp(log + sign * 1.96 * sd)), "-") for sign in (-1, 1))
-    return f"{low} to {high}"
+        return [breakable(name), "Factor", meaning, "not recorded", quantity(factor, "-"), DASH]
+    before, after = uncertain(1.0, found["prior_sd"], "-"), uncertain(factor, factor * found["sd"], "-")
+    return [breakable(name), "Factor", meaning, before, after, "no" if found["outside"] else "yes"]

@@ -122,7 +122,7 @@ def _withdrawal(found: Data | None, drawn: bytes) -> Markup | None:
 
 def _parameters(c: Data) -> Markup:
     """The fitted values, what the words mean, the posterior, and what cannot be told apart."""
-    head = ("Parameter", "Value", "95 % interval", "Literature, 95 %", "Identifiability", "Status")
+    head = ("Parameter", "Value", "95 % interval", "Literature, 95 %", "Identifiability", "Kind of source")
     rows = []
     for p in c["parameters"]:
         name = joined([element("code", p["name"]), element("small", p["meaning"])])

@@ -19,6 +19,7 @@ from reports.web.parts import assets, chart, limits_section, mark, pairs, stampe
 
 FORCES = "Measured, simulated and predicted force over stroke with the 95 % band, and the residual below"
 HEAD = ("Cut", "NRMSE", "Shape", "ISO rating", "Peak", "Work", "In band", "Band width", "Factor", "Verdict")
+ONE_SD = "±: one standard uncertainty, before and after; of a factor that of its logarithm, times the factor."
 PREDICTED, FITTED = "predicted from the other cuts", "simulated, fitted to it too"
 WORDS = (
     "Shape: difference of the curves over their own peaks. ISO rating: overall rating in the manner of ISO/TS 18571, "
@@ -107,7 +108,8 @@ def _verdict(c: Data) -> Markup:
         said = " ".join(text for text in (limits, *c[f"{key}_notes"]) if text)
         parts.append(element("p", said, class_="note") if rows and said else Markup(""))
     words = element("p", f"{WORDS} {c['chi_square']}", class_="note")
-    return element("section", element("p", c["sentence"]), *parts, words, id="verdict")
+    conflicts = [element("p", element("strong", text)) for text in c["conflicts"]]
+    return element("section", element("p", c["sentence"]), *conflicts, *parts, words, id="verdict")
 
 
 def _forces(
@@ -160,7 +162,6 @@ def _model(c: Data) -> Markup:
         element("p", w["method"]),
         table(head, w["cuts"], (4, 5, 6, 7), id="cuts", label="The cuts as they were simulated"),
         table(("Part", "Law", "Properties"), laws, label="Laws"),
-        element("p", w["fixed"]),
     ]
     if w["conditioning"]:
         parts += [element("h3", "From record to curve"), table(kept, w["conditioning"], (2, 4, 5, 6), label="Records")]
@@ -169,10 +170,11 @@ def _model(c: Data) -> Markup:
         parts += [element("h3", "Where the limits come from")]
         parts += [table(("Line", "Its limit"), w["limit_sources"], label="Where the limits come from")]
     if ranges:
-        title, columns = "Where the ranges come from", ("Property", "Literature, 95 %", "Status", "Source")
+        title, columns = "Where the priors come from", ("Property", "Prior, 95 %", "Kind of source", "Source")
         parts += [element("h3", title), table(columns, ranges, label=title)]
     listed = element("ol", *(element("li", text) for text in w["references"]), class_="note")
-    return element("section", *parts, element("h3", "References"), listed, id="model")
+    of_values = [element("h3", "References of the values"), pairs(w["food_references"])] if w["food_references"] else []
+    return element("section", *parts, element("h3", "References"), listed, *of_values, id="model")
 
 
 def _ranking(c: Data) -> Markup:
@@ -188,12 +190,18 @@ def _ranking(c: Data) -> Markup:
 
 def _parameters(c: Data) -> Markup:
     """Values, what the measurements leave open, and what numerical choices change."""
-    head = ("Parameter", "Value", "95 % interval", "Literature, 95 %", "Identifiability")
+    head = ("Parameter", "Value", "95 % interval", "Prior, 95 %", "Identifiability")
     parts: list[Markup] = []
     for key, title, more in (("shared", "Of all cuts", ()), ("own", "Of one cut, or of one knife", ("Of",))):
         rows = [
-            [joined([element("code", p[0]), element("small", p[1])]), element("strong", p[2]), *p[3 : 6 + len(more)]]
-            for p in c[key]
+            [
+                joined([element("code", p[0]), element("small", p[1])]),
+                element("strong", p[2]),
+                *p[3:5],
+                _verdict_of(p),
+                *p[6 : 6 + len(more)],
+            ]
+            for p in c[key]  # fmt: skip
         ]
         if rows:
             parts += [
@@ -202,16 +210,28 @@ def _parameters(c: Data) -> Markup:
             ]
     if not parts:
         parts = [element("p", "No parameter was fitted.")]
+    if c["legend"]:
+        parts += [element("p", "; ".join(f"{word}: {text}" for word, text in c["legend"]) + ".", class_="note")]
+    if c["fixed"]:
+        title, columns = "Values that were not fitted", ("Property", "Value", "Kind of source", "Source")
+        rows = [[joined([element("code", row[0]), element("small", row[1])]), *row[2:]] for row in c["fixed"]]
+        parts += [element("h3", title), table(columns, rows, (1,), label=title)]
     if c["left_open"]:
         known_before = ("Cut", "Quantity", "What it is", "Known before", "What the fit says", "Within 3 sd")
         open_ = [[*row[:5], mark_of(row[5])] for row in c["left_open"]]
         parts += [element("h3", "What the measurements leave open")]
         parts += [table(known_before, open_, (3, 4), label="What the measurements leave open")]
+        parts += [element("p", ONE_SD, class_="note")]
     if c["checks"]:
         parts += [element("h3", "What numerical choices change")]
         parts += [table(("Cut", "Choice", "Peak", "Work"), c["checks"], (2, 3), label="Numerical checks")]
         parts += [element("p", c["checks_note"], class_="note")] if c["checks_note"] else []
     return element("section", element("h2", "What was fitted"), *parts, id="parameters")
+
+
+def _verdict_of(p: Sequence[str]) -> Markup:
+    """What is known of a parameter, and whether it is outside of its prior."""
+    return joined([p[5], ", ", element("strong", p[7])] if p[7] else [p[5]])
 
 
 def mark_of(word: str) -> Markup:

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from calib.material.food import load_foods
+from calib.material.food_file import dump_material
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import ThreeTermCurve, null_models
 from tests.reports import sample
@@ -17,6 +19,11 @@ CONDITIONING = {
     "baseline_N": 0.41, "baseline_sd_N": 0.02, "baseline_kind": "constant", "onset_s": 1.25, "onset_sd_s": 0.01,
     "end_s": 2.9, "stroke_m": 0.033, "stroke_source": "position", "noise_sd_N": 0.05, "filter_sd_m": 0.0005,
 }  # fmt: skip
+SCENE = {
+    "board": {"mu": 0.5, "suction": 0.0}, "edge": {"zone": 0.0067, "slip": 0.001},
+    "numerics": {"ppc": 2, "safety": 0.7, "gravity": 9.81, "crack_ties": 3.0},
+}  # fmt: skip
+"""What the report reads of a simulated scene."""
 SPEED = "peak +0.8 %, work −0.40 %, extrapolated to rest"
 STROKE = np.linspace(0.0, 0.033, 240)
 #: By cut: strength of its specimen, height of its skin peak [N], and the error of its simulation.
@@ -51,6 +58,7 @@ def summary() -> dict[str, Any]:
         "warnings": ["first: no position and no speed"],
         "command": ["calibrate", "--config", "cuts.yaml", "--out", "out"],
         "versions": base["versions"], "git": base["git"], "seed": 0, "device": "cpu", "presses": {},
+        "correlations": {"R,E": -0.93, "mu,E": 0.21, "mu,R": 0.4}, "discrepancy": 0.03,
     }  # fmt: skip
 
 
@@ -58,6 +66,7 @@ def write_study(folder: Path, **changes: Any) -> Path:
     """Write the folder, with top-level entries of the summary replaced."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "summary.json").write_text(json.dumps(summary() | changes, indent=1))
+    dump_material(load_foods()["banana"], folder / "material.yaml", {"study": "cuts.yaml"})
     for name in CUTS:
         columns = curves(name)
         table = np.column_stack(list(columns.values()))
@@ -86,7 +95,7 @@ def _fitted(name: str) -> dict[str, Any]:
         "shape": sample.summary()["shape"], "knife": sample.summary()["knife"], "in_sample": True, "passed": True,
         "metrics": _compared(name).as_dict(), "factor": 1.04, "predictive_inside": 1.0, "verdicts": _lines(name),
         "predictive_width": _width(name), "scalars": {"particles": 5120.0}, "dx_m": 0.003,
-        "conditioning": CONDITIONING,
+        "conditioning": CONDITIONING, "mach": 0.01, "scene": SCENE,
         "nuisances": {"tare": {"value": 0.01, "sd": 0.02, "prior_sd": 0.03, "unit": "N", "outside": False},
                       "scale": {"value": 0.04, "sd": 0.06, "prior_sd": 0.15, "unit": "-", "outside": False}},
         "null_models": {n: {k: m[k] for k in ("R", "nrmse")} for n, m in _nulls(name).items()},

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 from calib.io.schema import tag
@@ -13,7 +12,7 @@ from reports import ReportError
 
 HELP = "write report.pdf and report.html of a finished run again"
 DESCRIPTION = """Write report.pdf and report.html again from the files that a calibration, a
-study of several cuts, converge, verify, stress or bench wrote."""
+study of several cuts, compress, converge, verify, stress or bench wrote."""
 EPILOG = "examples:\n  cutcal report runs/banana\n  cutcal report runs/banana --context context.yaml"
 
 
@@ -58,8 +57,9 @@ def writer(folder: Path) -> Callable[[Path], Path]:
         ReportError: The folder is missing, or holds no finished run.
     """
     from calib.calibration import report as calibration
-    from calib.material.properties import MEANINGS
-    from reports.multi_specimen import report as multi_specimen
+    from calib.compression import report as compression
+    from calib.multi_specimen import report as multi_specimen
+    from reports.multi_specimen.report import is_study
     from studies.convergence import report as convergence
     from studies.speed import report as bench
     from studies.stability import report as stability
@@ -70,6 +70,7 @@ def writer(folder: Path) -> Callable[[Path], Path]:
         "verify.json": verification.write_report,
         "stress.json": stability.write_report,
         "bench.json": bench.write_report,
+        "compress.json": compression.write_report,
     }
     for name, write in found.items():
         if (folder / name).exists():
@@ -80,5 +81,4 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     if not summary.exists():
         names = ", ".join(("summary.json", *found))
         raise ReportError(f"{folder}: holds none of {names}; give the --out of a finished run")
-    study = partial(multi_specimen.write_report, meanings=MEANINGS)
-    return study if multi_specimen.is_study(summary) else calibration.write_report
+    return multi_specimen.write_report if is_study(summary) else calibration.write_report

@@ -11,6 +11,7 @@ import pytest
 from calib.io.yaml_checks import data_path
 from calib.material.food import FoodSpec, load_foods
 from calib.material.properties import Property
+from calib.material.references import references as full_references
 
 #: What a source may not name, and why: a prior is not made of what it is fitted to or judged by.
 NOT_A_SOURCE = {
@@ -99,3 +100,18 @@ def test_layers_are_of_foods_that_have_them() -> None:
         if food.layers:
             shape, outer = food.to_scene_food().shape, food.properties.get("rind_thickness")
             assert outer is None or outer.high < min(shape.height, shape.width) / 4
+
+
+def test_a_reference_has_authors_and_year_or_says_that_it_has_not() -> None:
+    """Authors stand first and a year in brackets; what nobody found is named as incomplete."""
+    full = full_references()
+    assert len(full) > 50
+    for name, text in full.items():
+        gaps = "".join(re.findall(r"incomplete: ([^)]*)", text))
+        person, several = r"[^\W\d]\S*( [^\W\d]\S*)?, [A-Z]\.", r"[A-Z]\S+(, [A-Z]\S+)*( et al\.| and [A-Z])"
+        by = rf"{person}|{several}|[A-Z]\S+ \("
+        assert re.match(by, text) or "authors" in gaps, (name, text)
+        assert re.search(r"\((19|20)\d\d[,)]", text) or "year" in gaps, (name, text)
+    assert (
+        full["Muscadine"].startswith("Conner, P. J. (2013)") and "J. Mater. Sci. 28:45-51" in full["Khan and Vincent"]
+    )

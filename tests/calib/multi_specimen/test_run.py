@@ -179,6 +179,12 @@ def test_what_is_written_can_be_read(finished: tuple[Path, Path, int]) -> None:
     assert all(read_section(out / f"record-{name}.h5") is not None for name in SPECIMENS)
     assert summary["traces"]["b"]["shape"]["height"] == HEIGHT and summary["traces"]["b"]["knife"]["name"] == "kitchen"
     assert any("are predictions from the other cuts" in text for text in summary["limits"])
+    names = list(summary["parameters"])
+    assert len(summary["correlations"]) == len(names) * (len(names) - 1) // 2
+    assert all(set(pair.split(",")) <= set(names) and abs(r) <= 1.0 for pair, r in summary["correlations"].items())
+    scene = summary["traces"]["b"]["scene"]
+    assert scene["motion"]["mach"] == summary["traces"]["b"]["mach"] and scene["food"]["shape"]["height"] == HEIGHT
+    assert summary["discrepancy"] == 0.03
 
 
 @pytest.mark.slow

@@ -17,9 +17,9 @@ from tests.reports.sample import pages, spaced
 
 
 def test_a_study_becomes_a_pdf_that_is_stable(tmp_path: Path) -> None:
-    """Verdicts, curves, model, what was fitted and the limits on six pages; the same files give the same bytes."""
+    """Verdicts, curves, model, what was fitted and the limits on seven pages; the same files give the same bytes."""
     first = write_report(sample.write_study(tmp_path / "a")).read_bytes()
-    assert first.startswith(b"%PDF") and pages(first) == 6
+    assert first.startswith(b"%PDF") and pages(first) == 7
     assert write_report(sample.write_study(tmp_path / "b")).read_bytes() == first
 
 
@@ -89,7 +89,7 @@ def test_a_cut_that_is_held_out_and_fitted_has_both_lines(tmp_path: Path) -> Non
         ("third, held out", 5), ("first", 6), ("second", 6), ("third, in-sample", 6),
     ]  # fmt: skip
     factors = {row[0]: row[4].split()[0] for row in got["left_open"] if row[1] == "Factor"}
-    assert factors["third, held out"] == "0.910" and factors["third, in-sample"] == "1.04"
+    assert factors["third, held out"] == "0.910" and factors["third, in-sample"] == "1.040"
     assert len(got["model"]["cuts"]) == 3
 
 
@@ -129,9 +129,9 @@ def test_the_model_says_what_was_simulated(tmp_path: Path) -> None:
     assert [[spaced(cell) for cell in row] for row in w["conditioning"]][0] == [
         "third", "constant, 0.410 ± 0.020 N", "1.250 ± 0.010 s", "position", "0.050 N", "0.5 mm", "15.0 Hz",
     ]  # fmt: skip
-    assert len(w["references"]) == 10 and w["references"][6].startswith("Kennedy") and "[1]" in w["method"]
+    assert len(w["references"]) == 12 and w["references"][7].startswith("Kennedy") and "[1]" in w["method"]
     assert any(text.startswith("Koh") for text in w["references"])  # of a limit
-    assert "integrated out of the curve [7]" in w["objective"]
+    assert "integrated out of the curve [8]" in w["objective"]
     assert {row[0] for row in w["ranges"]} == {name.split("@")[0] for name in s["parameters"]}
     reason = "practice of explicit quasi-static analysis: 5 to 10 %"
     assert ["kinetic over internal energy", reason] in w["limit_sources"]
@@ -146,7 +146,7 @@ def test_the_factor_has_a_prior_and_an_interval(tmp_path: Path) -> None:
     s = sample.summary()
     rows = {row[0]: [spaced(cell) for cell in row[2:]] for row in content(read_study(sample.write_study(tmp_path)))[
         "left_open"] if row[1] == "Factor"}  # fmt: skip
-    assert rows["third"] == ["factor on the force: width and sensor", "0.745 to 1.34 (95 %)", "0.910 (0.875 to 0.946)",
+    assert rows["third"] == ["factor on the force: width and sensor", "1.00 ± 0.15", "0.910 ± 0.018",
                              "yes"]  # fmt: skip
     assert set(rows) == {"first", "second", "third"}
     s["hold_out"]["third"]["nuisances"] = None
@@ -237,5 +237,6 @@ def test_compression_tests_are_told(tmp_path: Path) -> None:
              "files": [{"name": "press.csv", "sha256": "c0ffee00" * 8}]}  # fmt: skip
     with_one = content(read_study(sample.write_study(tmp_path / "one", presses={"pressed": press})))["model"]
     (row,) = ([spaced(cell) for cell in row] for row in with_one["presses"])
-    assert row == ["pressed", "278 kPa", "13 %", "4", "0.45", "press.csv, SHA-256 c0ffee00c0ffee00"]
+    assert row[:5] == ["pressed", "278 kPa", "13 %", "4", "0.45"] and row[6] == "press.csv, SHA-256 c0ffee00c0ffee00"
+    assert row[5] == "3.0 standard deviations above it"  # ln(412 / 278) / 0.13
     assert content(read_study(sample.write_study(tmp_path / "none")))["model"]["presses"] == []

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from calib.compression.measured import MeasuredFile
-from calib.compression.modulus import ModulusAtNu
-from calib.compression.modulus_calibration import CompressionTest, unshown
+from calib.compression.modulus import ModulusAtNu, ModulusFit
+from calib.compression.modulus_calibration import CompressionTest, acceptance_lines, unshown
 from calib.compression.press import PressRun
 from calib.compression.result import (
     Assumptions,
@@ -26,12 +26,14 @@ from calib.compression.result import (
     SmallStrainModulus,
     SpecimenSizes,
     StressCurves,
+    write_result,
 )
 from calib.texture.repeats import scatter
 from calib.validation.acceptance import Verdict
+from cutcal.main import main
 from mpm.scene.shapes import Shape
 from reports.base import brief
-from reports.base.labels import related
+from reports.base.labels import capital, related
 from reports.press.compression import write_report
 from reports.press.stress_strain import write_figure
 from reports.press.tables import between, mean_and_sd, sentences, verdict_table, with_sd
@@ -126,7 +128,7 @@ def test_a_compression_says_law_numerics_seed_and_files(told: Any) -> None:
     assert "10 cells of 3.00 mm" in facts["Simulation"] and "4374 particles, 17 947 steps" in facts["Simulation"]
     (file,) = rows["Files"]
     assert file[:3] == ["gel.csv", "compression_mm", "load_N"] and file[3].replace("\u200b", "") == "c0ffee00" * 8
-    assert [row[0] for row in rows["References"]] == ["[1]", "[2]"] and "Stomakhin" in rows["References"][0][1]
+    assert [row[0] for row in rows["References"]] == ["[1]", "[2]", "[3]"] and "Stomakhin" in rows["References"][0][1]
     cited = re.findall(r"\[(\d)\]", " ".join(text for _, text in content["facts"]))
     assert cited == ["1", "2"]  # in the order in which they are read
     (verdict,) = [part for part in content["parts"] if part["title"] == "Verdict"]
@@ -139,12 +141,36 @@ def test_a_compression_says_law_numerics_seed_and_files(told: Any) -> None:
     assert "two thirds of the cells" in bonded["parts"][0]["text"]
 
 
+def test_each_limit_of_a_compression_has_a_source(told: Any) -> None:
+    """Of every line that a run judges, between either plates, with a number of the list where somebody is cited."""
+    fit = ModulusFit(np.ones(1), 1.0, 0.0, 1.0, 1.0, STRAIN, 1.0, 0.0, 0.0, 0.0, 0.02)
+    lines = {line.name: line for error in (0.0, None) for line in acceptance_lines(fit, error, 0.0)}
+    content = told(result(verdicts=tuple(lines.values())))
+    rows = dict(tables(content)["Where the limits come from"])
+    assert set(rows) == {capital(name) for name in lines} and len(rows) == 4
+    assert rows["Curve error (NRMSE)"].endswith("[3]") and "Dawood" in tables(content)["References"][2][1]
+    titles = [part["title"] for part in content["parts"]]
+    assert titles[:2] == ["Verdict", "Where the limits come from"]
+
+
+def test_a_compression_is_typeset_again_from_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """``cutcal report`` writes figure, PDF and page of the files alone; a file that is missing is named."""
+    stress = 1e5 * STRAIN
+    write_result(result(), curves_of(("R0", stress), ("R1", 1.1 * stress), fitted=stress), tmp_path)
+    assert main(["report", str(tmp_path)]) == 0 and "report.pdf and report.html" in capsys.readouterr().out
+    assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF") and (tmp_path / "compress.svg").exists()
+    page = (tmp_path / "report.html").read_text()
+    assert "R1" in page and "Where the limits come from" in page
+    (tmp_path / "curves.csv").unlink()
+    assert main(["report", str(tmp_path)]) == 1 and "curves.csv" in capsys.readouterr().err
+
+
 def test_a_compression_says_slope_and_largest_error(told: Any) -> None:
     """Mean of the measured slopes, the fitted one, and the error of the force that the terminal shows."""
     rows = tables(told(result()))
     assert rows["Modulus of each repeat"][-1] == ["Mean ± standard deviation", "96.30 ± 0.50 kPa", "100.20 ± 0.60 kPa"]
     assert [row[1] for row in rows["How close the fitted curve is"]] == [
-        "100.20 ± 0.60 kPa", "101 kPa", "+0.80 %", "+27.0 % at 2.1 %", "0.40 %",
+        "100.20 ± 0.60 kPa", "101 kPa", "+0.80 %", "+27.0 % at 2.1 %",
     ]  # fmt: skip
     assert rows["If another assumption holds"] == [["Poisson's ratio 0.44", "102 kPa"], ["Bonded plates", "68.3 kPa"]]
 
