@@ -105,7 +105,6 @@ class Stage:
         points = film.apart(look) if apart else film.surface.points(look)
         skin, flesh = self._parts
         skin.move(points)
-        skin.smooth(~film.surface.cut(look))
         flesh.move(points, film.surface.bare(look))
         self._knife.points = blade_at(scene, look)[0]
         self._plot.render()
@@ -124,11 +123,6 @@ class _Part:
         )
         self._used = np.array(self.mesh["vertex"])
         self._triangles = np.array(self.mesh.regular_faces)
-        # rims of both halves side by side: a vertex on an edge of the food has several copies, and keeps its light
-        single = [np.flatnonzero(np.isin(self._used, rim) & _once(self._used)) for rim in surface.rims.T]
-        left, right = (dict(zip(self._used[own].tolist(), own.tolist(), strict=True)) for own in single)
-        both = [(a, b) for a, b in surface.rims.tolist() if a in left and b in right]
-        self._rims = np.array([(left[a], right[b]) for a, b in both], int).reshape(-1, 2)
 
     def move(self, points: np.ndarray, seen: np.ndarray | None = None) -> None:
         """Put the vertices to where those of the whole surface (m, 3) are [m], and draw the triangles that are seen."""
@@ -137,20 +131,6 @@ class _Part:
             self.mesh.regular_faces = self._triangles[seen]
         if self.mesh.n_cells:
             self.mesh.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False, inplace=True)
-
-    def smooth(self, whole: np.ndarray) -> None:
-        """Light both halves as one along their rims where the food is whole, a truth value for each vertex (m,)."""
-        pairs = self._rims[whole[self._used[self._rims]].all(axis=1)]
-        normals = np.array(self.mesh.point_data["Normals"])
-        mean = normals[pairs].sum(axis=1)
-        normals[pairs] = (mean / np.linalg.norm(mean, axis=1, keepdims=True))[:, None]
-        self.mesh.point_data["Normals"] = normals
-
-
-def _once(ids: np.ndarray) -> np.ndarray:
-    """Which of some numbers (m,) are there once only."""
-    out: np.ndarray = np.bincount(ids)[ids] == 1
-    return out
 
 
 def stills(film: Film, folder: Path) -> list[Path]:

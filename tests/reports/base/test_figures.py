@@ -209,8 +209,8 @@ def looked_at(width: float = 0.1, height: float = 0.03) -> Section:
 
 
 def test_three_moments_of_the_cut_are_shown() -> None:
-    """Early, nearest to the largest force, at the end; a force that is largest at the end makes two. Where no look is at
-    the largest force, its name says at which stroke that is."""
+    """Early, nearest to the largest force, at the end; a force that is largest at the end makes two. Where no look is
+    at the largest force, its name says at which stroke that is."""
     stroke = np.linspace(0, 0.02, 50)
     section = looked_at()
     shown = pictures.moments(section, stroke, np.sin(np.pi * stroke / 0.024))
