@@ -55,7 +55,7 @@ def limits(
     if label != "measured":
         said.append(f"The trace is {label}, not a measurement: agreement with it says nothing about a real food.")
     said.append("All figures are in-sample: the same trace was fitted and compared. Nothing here is validated.")
-    said += [f"{v.name}: failed; see the first page." for v in verdicts if v.passed is False]
+    said += [f"{v.name}: failed; see the verdict table." for v in verdicts if v.passed is False]
     said += _limits_of_parameters(fitted)
     said += _limits_of_measurement(stroke_source, baseline_kind)
     said += [f"{_as_sentence(a)}." for a in assumptions]

@@ -118,6 +118,7 @@ class Surface:
         self.second = len(left.points)
         self._starts = (0, self.second)
         self._mirrored = mirrors[1]
+        self._flat_ends = shape.prism
         sides = (-1.0,) if self._mirrored else (-1.0, 1.0)
         self._carried = [_Carried(places[side], seeds.x, side, mirrors[0]) for side in sides]
         self.triangles = np.concatenate([left.triangles, right.triangles + len(left.points)])
@@ -130,9 +131,27 @@ class Surface:
 
     @property
     def parts(self) -> tuple[np.ndarray, np.ndarray]:
-        """Triangles of the skin and of the faces of the cut, shapes (t, 3)."""
-        inside = self.face[self.triangles].all(axis=1)
+        """Triangles of the skin and of the flesh, shapes (t, 3).
+
+        The flesh shows on the faces of the cut and on the flat ends of a food with parallel sides, which is a piece of
+        a longer one.
+        """
+        inside = self._inside(self._ends if self._flat_ends else np.zeros_like(self._ends)) | self._inside(self.face)
         return self.triangles[~inside], self.triangles[inside]
+
+    @property
+    def rims(self) -> np.ndarray:
+        """Vertices of the rims of both faces, those of one place side by side, shape (AROUND, 2)."""
+        return np.add.outer(np.arange(ON_FACE - AROUND, ON_FACE), self._starts)
+
+    def bare(self, now: Snapshot) -> np.ndarray:
+        """Which triangles of the flesh are seen, shape (t,): all of an end, of the faces those the cut has reached.
+
+        The faces of a food that is whole lie within it, and their rims along its skin, where they would show as a line.
+        """
+        flesh = self.parts[1]
+        out: np.ndarray = self.cut(now)[flesh].any(axis=1) | ~self.face[flesh].all(axis=1)
+        return out
 
     def points(self, now: Snapshot) -> np.ndarray:
         """Places of the vertices [m], shape (m, 3): both halves are one where the cut has not passed."""
@@ -149,6 +168,19 @@ class Surface:
         passed = self.values(now.severed.astype(float)) >= PASSED
         left, right = (passed[start : start + ON_FACE] for start in self._starts)
         return self._on_faces(left | right)
+
+    @property
+    def _ends(self) -> np.ndarray:
+        """Whether a vertex lies on a far end, its rim among them, shape (m,)."""
+        out = np.zeros(len(self.rest), bool)
+        for end in (self.second, len(self.rest)):
+            out[end - ON_FACE : end] = True
+        return out
+
+    def _inside(self, vertices: np.ndarray) -> np.ndarray:
+        """Which triangles have all their corners among some vertices, a truth value (m,) each; shape (t,)."""
+        out: np.ndarray = vertices[self.triangles].all(axis=1)
+        return out
 
     def _on_faces(self, values: np.ndarray) -> np.ndarray:
         """Truth values (ON_FACE,) of both faces among those of all vertices (m,)."""

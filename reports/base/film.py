@@ -51,10 +51,11 @@ class Film:
         scene: What was simulated.
         surface: The food's surface.
         seeds: Its particles at rest.
-        looks: What was seen of it, in the order of time.
+        looks: What was seen of it, in the order of time: at contact, and from then on.
         time: Simulated time of the record [s], shape (n,).
         stroke: Stroke of the record [m], shape (n,).
         force: Upward force on the knife [N], shape (n,).
+        down: Rows of the record before the blade is withdrawn; None where it is not.
     """
 
     food: str
@@ -65,6 +66,7 @@ class Film:
     time: np.ndarray
     stroke: np.ndarray
     force: np.ndarray
+    down: int | None = None
 
     @staticmethod
     def of(food: str, simulation: Simulation, looks: Sequence[Snapshot], record: ForceRecord) -> Film:
@@ -77,11 +79,16 @@ class Film:
             record: Its forces.
 
         Returns:
-            What is drawn of it.
+            What is drawn of it, with the food at rest when the blade touches it.
         """
         scene, seeds = simulation.scene, simulation.setup.seeds
         surface = Surface(scene.food.shape, seeds, scene.mirrors)
-        return Film(food, scene, surface, seeds, looks, record.time, record.stroke, record.resolved)
+        way = np.concatenate([[-simulation.setup.gap], record.stroke[: record.cut_rows]])
+        time = float(np.interp(0.0, way, np.concatenate([[0.0], record.time[: record.cut_rows]])))
+        calm = np.zeros(len(seeds.x))
+        contact = Snapshot(time, 0.0, 0.0, seeds.x, calm, calm > 0.0)
+        looks = [contact, *(look for look in looks if look.time > time)]
+        return Film(food, scene, surface, seeds, looks, record.time, record.stroke, record.resolved, record.cut_rows)
 
     @cached_property
     def section(self) -> Section:
@@ -96,7 +103,13 @@ class Film:
 
     def force_at(self, look: Snapshot) -> float:
         """Upward force on the knife at a look [N]."""
-        return float(np.interp(look.time, self.time, self.force))
+        return float(np.interp(look.time, self.time, self.force, left=0.0))
+
+    @property
+    def peak(self) -> tuple[float, float, float]:
+        """Time [s], stroke [m] and value [N] of the largest force on the way down."""
+        k = int(np.argmax(self.force[: self.down]))
+        return float(self.time[k]), float(self.stroke[k]), float(self.force[k])
 
     def parted(self, look: Snapshot) -> bool:
         """Whether the cut has passed all of the food's section."""
@@ -110,9 +123,8 @@ class Film:
         return points
 
     def moments(self) -> dict[str, Snapshot]:
-        """The looks nearest to contact, to the largest force and to the end, by these words."""
-        peak = self.time[int(np.argmax(self.force))]
-        times = np.array([look.time for look in self.looks])
+        """The looks at contact, nearest to the largest force, and at the end, by these words."""
+        peak, times = self.peak[0], np.array([look.time for look in self.looks])
         chosen = (self.looks[0], self.looks[int(np.argmin(np.abs(times - peak)))], self.looks[-1])
         return dict(zip(MOMENTS, chosen, strict=True))
 
@@ -185,12 +197,13 @@ def _axes() -> np.ndarray:
 AXES = _axes()
 
 
-def board(film: Film) -> tuple[float, float, float, float, float, float]:
-    """Ends of the board along x, y and z [m]: as large as the food, with room to draw the pieces apart."""
+def board(film: Film, *, apart: bool = True) -> tuple[float, float, float, float, float, float]:
+    """Ends of the board along x, y and z [m]: as large as the food, with room to draw the pieces apart or without."""
     shape = film.scene.food.shape
     near, room = FRAME * max(shape.width, shape.height), 0.15 * shape.width
     low, high = shape.ends
-    return -0.7 * near, 0.85 * near, low - room, high + room + APART * shape.width, -0.12 * near, -1e-5
+    back = high + room + (APART * shape.width if apart else 0.0)
+    return -0.7 * near, 0.85 * near, low - room, back, -0.12 * near, -1e-5
 
 
 def corners(ends: tuple[float, float, float, float, float, float]) -> np.ndarray:

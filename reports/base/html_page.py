@@ -7,21 +7,28 @@ from __future__ import annotations
 
 import base64
 import gzip
+import json
+from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 
 from mpm.files import write_atomic
 from mpm.output.food_colours import Colour, food_colours
 from mpm.scene.errors import OutputError
-from reports.base.film import COLOURS, EYE, FRAME, Film, blade_at
+from reports.base.film import COLOURS, EYE, Film, blade_at, board, corners
 from reports.base.scene_render import INK, STEEL, WOOD
+from reports.base.scene_sheet import bar_ends, bar_length, numbers
 
+TEMPLATE = Path(__file__).resolve().parents[1] / "templates" / "cut.html"
 PER_METRE = 2e4  # whole numbers of the file in a metre: a twentieth of a millimetre, less than a pixel
 SHADES = 100  # of a page: more steps of the stress than colours would only make it larger
 WRAPPER = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>A simulated cut</title></head>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>A simulated cut</title></head>
 <body><p>Unpacking. This needs a browser of 2023 or later, with scripts.</p>
 <script>
 const packed = "PACKED";
@@ -31,9 +38,16 @@ new Response(stream).text().then((page) => { document.open(); document.write(pag
 </script></body></html>
 """
 HOVER = "%{x:.1f} mm, %{y:.2f} N<extra></extra>"
-LIGHT = {"ambient": 0.55, "diffuse": 0.7, "specular": 0.15}
-OF_FOOD = (1, 2)  # traces of the page that are the food: its skin and the faces of the cut
+LIGHT = {"ambient": 0.5, "diffuse": 0.6, "specular": 0.15}
+EVEN = {"ambient": 0.9, "diffuse": 0.1, "specular": 0.0}  # light on the flesh: its colour is seen from all sides
+LAMP = {"x": 60000, "y": -30000, "z": 90000}  # where light comes from, far beyond the scene
+SOLID = {"lighting": LIGHT, "lightposition": LAMP, "flatshading": True, "hoverinfo": "skip"}
+MOVING, OF_FOOD = (0, 1, 2), (0, 1)  # traces of the scene: skin, flesh and blade; those that are the food
 TITLES = ("von Mises stress [kPa]", "stroke [mm]", "force on the knife [N]")
+SAMPLES = 9  # of the scale of the stress
+MARKS = 5  # steps between the round numbers below the slider, at most
+STEPS = (1.0, 2.0, 5.0, 10.0)  # what such a step may be, times a power of ten
+THICK = 0.012  # of the scale bar and over the board, in lengths of the board
 
 
 def page(film: Film, path: Path, title: str) -> None:
@@ -49,94 +63,199 @@ def page(film: Film, path: Path, title: str) -> None:
     """
     try:
         import plotly.graph_objects as go
-        from plotly.subplots import make_subplots
+        from plotly.offline import get_plotlyjs
     except ImportError:
         raise OutputError("a page needs plotly: pip install 'cutcal[view]', or leave the option out") from None
-    figure = make_subplots(
-        rows=1, cols=2, column_widths=[0.66, 0.34], specs=[[{"type": "scene"}, {"type": "xy"}]], horizontal_spacing=0.07
-    )
-    figure.add_trace(_board(film, go), row=1, col=1)
-    for part, column in zip(_moving(film, 0, go, whole=True), (1, 1, 1, 2), strict=True):
-        figure.add_trace(part, row=1, col=column)
-    curve = go.Scatter(x=film.stroke * 1e3, y=film.force, mode="lines", line={"color": INK}, hovertemplate=HOVER)
-    figure.add_trace(curve, row=1, col=2)
-    figure.frames = [
-        go.Frame(data=_moving(film, k, go, whole=False), traces=[1, 2, 3, 4], name=str(k))
-        for k in range(len(film.looks))
-    ]
-    figure.update_layout(**_layout(film, title))
-    figure.update_xaxes(title=TITLES[1], zeroline=False)
-    figure.update_yaxes(title=TITLES[2], rangemode="tozero")
-    text = packed(figure.to_html(include_plotlyjs=True, full_html=True, auto_play=False, config={"displaylogo": False}))
+    parts = {
+        "TITLE": escape(title),
+        "CUT": json.dumps(content(film, go), separators=(",", ":")).replace("<", "\\u003c"),
+        "PLOTLY": get_plotlyjs(),
+    }
+    text = TEMPLATE.read_text(encoding="utf-8")
+    for name, part in parts.items():
+        text = text.replace(f"@{name}@", part)
     try:
-        write_atomic(path, text)
+        write_atomic(path, packed(text))
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e.strerror or e})") from None
 
 
-def packed(page: str) -> str:
+def packed(text: str) -> str:
     """A page that unpacks another one in the browser: a third of its size, and still one file without a network.
 
     Args:
-        page: The HTML document.
+        text: The HTML document.
 
     Returns:
         The HTML document that holds it.
     """
-    return WRAPPER.replace("PACKED", base64.b64encode(gzip.compress(page.encode(), mtime=0)).decode())
+    return WRAPPER.replace("PACKED", base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode())
+
+
+def content(film: Film, go: Any) -> dict[str, Any]:
+    """What the page's script draws.
+
+    Args:
+        film: What to show.
+        go: ``plotly.graph_objects``.
+
+    Returns:
+        Plain data: scene with a frame for each look, forces, words of each look and where the food's halves are one,
+        marks of the slider, colours, and the corners of all that there is, in the lengths of the scene's camera.
+    """
+    box = _boxes(film)
+    low, high = box.min(axis=0), box.max(axis=0)
+    size = float((high - low).max())
+    bar, length = _bar(film, go)
+    layout = _scene_layout(low, high, size)
+    layout["scene"]["annotations"] = [length]
+    scene = go.Figure(
+        [*_moving(film, 0, go, whole=True), _board(film, go), bar],
+        layout=layout,
+        frames=[
+            go.Frame(data=_moving(film, k, go, whole=False), traces=list(MOVING), name=str(k))
+            for k in range(len(film.looks))
+        ],
+    )
+    at = {"stroke": film.looks[0].stroke * 1e3, "force": film.force_at(film.looks[0])}
+    forces = go.Figure(
+        [
+            go.Scatter(x=film.stroke * 1e3, y=film.force, mode="lines"),
+            go.Scatter(x=[at["stroke"]], y=[at["force"]], mode="markers", marker={"size": 11}, cliponaxis=False),
+        ],
+        layout={
+            "template": "plotly_white",
+            "showlegend": False,
+            "margin": {"l": 58, "r": 12, "t": 12, "b": 48},
+            "xaxis": {"title": {"text": TITLES[1]}, "zeroline": False, "fixedrange": True},
+            "yaxis": {"title": {"text": TITLES[2]}, "rangemode": "tozero", "fixedrange": True},
+        },
+    )
+    forces.update_traces(hovertemplate=HOVER, line_color=INK, marker_color=INK)
+    return {
+        "scene": json.loads(scene.to_json()),
+        "forces": json.loads(forces.to_json()),
+        "looks": [
+            {
+                "stroke": look.stroke * 1e3,
+                "force": film.force_at(look),
+                "said": numbers(film, look),
+                "whole": [int(whole) for whole in ~film.surface.cut(look)[film.surface.rims[:, 0]]],
+            }
+            for look in film.looks
+        ],
+        "rims": np.searchsorted(np.unique(film.surface.parts[0]), film.surface.rims).tolist(),
+        "ticks": ticks([look.stroke * 1e3 for look in film.looks]),
+        "own": own_colours(film.food),
+        "stress": [stress_colours()] * len(OF_FOOD),
+        "coloured": OF_FOOD,
+        "corners": ((box - (low + high) / 2) / size).tolist(),
+        "eye": EYE.tolist(),
+    }
+
+
+def ticks(strokes: Sequence[float]) -> list[tuple[float, str]]:
+    """Round strokes below a slider that goes from look to look, each where its stroke is passed.
+
+    >>> ticks([0.0, 7.0, 20.0])
+    [(0.0, '0'), (0.357, '5'), (0.615, '10'), (0.808, '15'), (1.0, '20')]
+
+    Args:
+        strokes: Those of the looks [mm]; they fall where the blade is withdrawn.
+
+    Returns:
+        Part of the slider and number of each.
+    """
+    way = float(np.abs(np.diff(strokes)).sum())
+    if way == 0.0:
+        return []
+    power = 10.0 ** np.floor(np.log10(way / MARKS))
+    step = next(k * power for k in STEPS if k * power * MARKS >= way * (1.0 - 1e-9))
+    found: dict[float, str] = {}
+    for k, (begin, end) in enumerate(zip(strokes[:-1], strokes[1:], strict=True)):
+        first, last = np.ceil(min(begin, end) / step - 1e-9), np.floor(max(begin, end) / step + 1e-9)
+        for mark in step * np.arange(first, last + 1):
+            part = 0.0 if begin == end else (mark - begin) / (end - begin)
+            found[round((k + float(part)) / (len(strokes) - 1), 3)] = f"{mark + 0.0:.12g}"
+    return sorted(found.items())
+
+
+def _boxes(film: Film) -> np.ndarray:
+    """Corners (24, 3) [m] of boxes around the food at all looks, around the blade, and of the board."""
+    foods = np.concatenate([film.surface.points(look) for look in film.looks])
+    blades = np.concatenate([blade_at(film.scene, look)[0] for look in film.looks])
+    around = [np.column_stack([all_.min(axis=0), all_.max(axis=0)]).ravel() for all_ in (foods, blades)]
+    return np.concatenate([corners(tuple(ends)) for ends in around] + [corners(board(film, apart=False))])
 
 
 def _board(film: Film, go: Any) -> Any:
-    """The top of the board."""
-    shape = film.scene.food.shape
-    near = FRAME * max(shape.width, shape.height)
-    a, b = 0.7 * near, 0.55 * max(shape.length, 2 * near)
-    x, y = np.array([-a, a, a, -a]), np.array([-b, -b, b, b])
-    corners = np.column_stack([x, y, np.full(4, -1e-4)])
-    faces = _faces(np.array([[0, 1, 2], [0, 2, 3]]))
-    return go.Mesh3d(**_corners(corners), **faces, color=WOOD, lighting=LIGHT, hoverinfo="skip")
+    """The board."""
+    return _box(corners(board(film, apart=False)), WOOD, go)
+
+
+def _box(points: np.ndarray, colour: str, go: Any) -> Any:
+    """A box with these corners (8, 3) [m]."""
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = np.array([[s[a], s[b], s[c]] for s in sides for a, b, c in ((0, 1, 2), (0, 2, 3))])
+    return go.Mesh3d(**_corners(points), **_faces(triangles), color=colour, **SOLID)
+
+
+def _bar(film: Film, go: Any) -> tuple[Any, dict[str, Any]]:
+    """The scale bar, which lies on the board, and its length, which is written beside its end."""
+    (x, y, z), (_, end, _) = bar_ends(film)
+    _, _, low, high, _, _ = board(film, apart=False)
+    thick = THICK * (high - low)
+    words = {
+        **{name: float(place[0]) for name, place in _corners(np.array([[x, end + thick, z]])).items()},
+        "text": f"{1e3 * bar_length(film.scene.food.shape.length):g} mm",
+        "showarrow": False,
+        "xanchor": "left",
+        "font": {"size": 14, "color": INK},
+    }
+    return _box(corners((x, x + thick, y, end, z, z + thick / 4)), INK, go), words
 
 
 def _moving(film: Film, k: int, go: Any, *, whole: bool) -> list[Any]:
-    """Skin, faces of the cut, blade and the place on the curve at one look: all of them, or what changes.
+    """Skin, flesh and blade at one look: all of them, or what changes.
 
-    Skin and faces have vertices of their own, or their light would run into each other along the rim, like a groove.
+    Skin and flesh have vertices of their own, or their light would run into each other along the rim, like a groove.
+    A triangle of the flesh that is not seen has two corners in one place.
     """
     look, surface = film.looks[k], film.surface
     points, triangles = blade_at(film.scene, look)
     step = film.largest / 1e3 / SHADES
     stress = (step * np.round(surface.values(look.mises) / 1e3 / step)).astype(np.float32)
     places, knife = surface.points(look), _corners(points)
-    now = {"x": [look.stroke * 1e3], "y": [film.force_at(look)]}
-    parts = [np.unique(part, return_inverse=True) for part in surface.parts]
-    foods = [{"intensity": stress[used], **_corners(places[used])} for used, _ in parts]
+    foods, seen = [], (np.ones(len(surface.parts[0]), bool), surface.bare(look))
+    for part, shown in zip(surface.parts, seen, strict=True):
+        used, own = np.unique(part, return_inverse=True)
+        faces = _faces(own.reshape(-1, 3))
+        faces["j"] = np.where(shown, faces["j"], faces["i"])
+        now = {"intensity": stress[used], **_corners(places[used])}
+        foods.append(now | (faces if whole else {} if shown.all() else {"j": faces["j"]}))
     if not whole:
-        return [*(go.Mesh3d(**food) for food in foods), go.Mesh3d(**knife), go.Scatter(**now)]
-    bar = {"title": {"text": TITLES[0], "side": "right"}, "x": -0.04, "len": 0.6, "thickness": 14}
+        return [*(go.Mesh3d(**food) for food in foods), go.Mesh3d(**knife)]
+    bar = {"title": {"text": TITLES[0], "side": "top"}, "orientation": "h", "x": 0.5, "y": 1.0, "yanchor": "bottom"}
+    bar |= {"len": 0.8, "thickness": 12}
     colours = {"cmin": 0.0, "cmax": film.largest / 1e3, "colorbar": bar, "showscale": False}
     hover = "%{intensity:.3g} kPa<extra></extra>"
     meshes = [
-        go.Mesh3d(
-            **food,
-            **_faces(own.reshape(-1, 3)),
-            **colours,
-            colorscale=scale,
-            lighting=LIGHT,
-            hovertemplate=hover,
-        )
-        for food, (_, own), scale in zip(foods, parts, own_colours(film.food), strict=True)
+        go.Mesh3d(**food, **colours, colorscale=scale, lighting=light, lightposition=LAMP, hovertemplate=hover)
+        for food, scale, light in zip(foods, own_colours(film.food), (LIGHT, EVEN), strict=True)
     ]
-    return [
-        *meshes,
-        go.Mesh3d(**knife, **_faces(triangles), color=STEEL, flatshading=True, lighting=LIGHT, hoverinfo="skip"),
-        go.Scatter(**now, mode="markers", marker={"size": 11, "color": INK}, hovertemplate=HOVER),
-    ]
+    return [*meshes, go.Mesh3d(**knife, **_faces(triangles), color=STEEL, **SOLID)]
 
 
 def own_colours(food: str) -> list[list[list[Any]]]:
     """Scales of one colour, whatever the stress: of the skin of a food, and of its flesh."""
     known = food_colours(food)
     return [[[end, _rgb(colour)] for end in (0, 1)] for colour in (known.skin, known.flesh)]
+
+
+def stress_colours() -> list[list[Any]]:
+    """The scale of the stress, as the pictures have it: light where it is small."""
+    scale = colormaps[COLOURS]
+    return [[part, _rgb(scale(part)[:3])] for part in np.linspace(0.0, 1.0, SAMPLES).tolist()]
 
 
 def _rgb(colour: Colour) -> str:
@@ -154,60 +273,13 @@ def _faces(triangles: np.ndarray) -> dict[str, np.ndarray]:
     return dict(zip("ijk", triangles.astype(np.int32).T, strict=True))
 
 
-def _layout(film: Film, title: str) -> dict[str, Any]:
-    """Axes, camera and slider."""
-    shape = film.scene.food.shape
-    reach = PER_METRE * FRAME * max(shape.width, shape.height)
-    long, top = PER_METRE * 0.6 * max(shape.length, 2 * shape.width), PER_METRE * 1.6 * shape.height
-    ranges = {"xaxis": [-reach, reach], "yaxis": [-long, long]}
+def _scene_layout(low: np.ndarray, high: np.ndarray, size: float) -> dict[str, Any]:
+    """Axes of a box with these ends [m], (3,) each, in a scene where a length of ``size`` [m] is one of the camera."""
     scene: dict[str, Any] = {
-        name: {"range": limits, "visible": False} for name, limits in (ranges | {"zaxis": [-0.01 * top, top]}).items()
+        f"{name}axis": {"range": [PER_METRE * a, PER_METRE * b], "visible": False}
+        for name, a, b in zip("xyz", low.tolist(), high.tolist(), strict=True)
     }
-    eye = 3.2 * EYE / np.linalg.norm(EYE)
-    scene |= {"aspectmode": "data", "camera": {"eye": dict(zip("xyz", map(float, eye), strict=True))}}
-    step = {"frame": {"duration": 0, "redraw": True}, "mode": "immediate", "transition": {"duration": 0}}
-    play = {"frame": {"duration": 120, "redraw": True}, "fromcurrent": True, "transition": {"duration": 0}}
-    return {
-        "title": {"text": title, "x": 0.5},
-        "showlegend": False,
-        "template": "plotly_white",
-        "scene": scene,
-        "margin": {"l": 70, "r": 20, "t": 60, "b": 20},
-        "sliders": [
-            {
-                "currentvalue": {"prefix": f"{TITLES[1]} "},
-                "steps": [
-                    {"args": [[str(k)], step], "label": f"{look.stroke * 1e3:.1f}", "method": "animate"}
-                    for k, look in enumerate(film.looks)
-                ],
-            }
-        ],
-        "updatemenus": [
-            {
-                "type": "buttons",
-                "direction": "left",
-                "x": 0.0,
-                "y": 1.08,
-                "buttons": [
-                    {"label": "play", "method": "animate", "args": [None, play]},
-                    {"label": "stop", "method": "animate", "args": [[None], step]},
-                ],
-            },
-            {
-                "type": "buttons",
-                "direction": "left",
-                "x": 0.22,
-                "y": 1.08,
-                "buttons": [
-                    _coloured("food", own_colours(film.food), shown=False),
-                    _coloured("stress", [COLOURS, COLOURS], shown=True),
-                ],
-            },
-        ],
-    }
-
-
-def _coloured(label: str, scales: list[Any], *, shown: bool) -> dict[str, Any]:
-    """A button that colours skin and faces of the cut by these scales, with the bar of the stress or without."""
-    change = {"colorscale": scales, "showscale": [shown, False]}
-    return {"label": label, "method": "restyle", "args": [change, list(OF_FOOD)]}
+    ratio = dict(zip("xyz", ((high - low) / size).tolist(), strict=True))
+    camera = {"eye": dict(zip("xyz", EYE.tolist(), strict=True)), "center": {"x": 0, "y": 0, "z": 0}}
+    scene |= {"aspectmode": "manual", "aspectratio": ratio, "camera": camera, "dragmode": "orbit"}
+    return {"template": "plotly_white", "showlegend": False, "scene": scene, "margin": dict.fromkeys("lrtb", 0)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,9 +24,6 @@ from reports.base.film import (
     corners,
 )
 from reports.base.scene_sheet import Sheet, view_size
-
-if TYPE_CHECKING:
-    pass
 
 SIZE, VIDEO_SIZE = (1200, 900), (960, 720)  # of a picture and of a video [pixels]
 STEEL, WOOD, PAPER, INK = "#8a9199", "#d9c4a0", "white", "black"
@@ -106,8 +103,9 @@ class Stage:
         film, scene = self.film, self.film.scene
         apart = apart and film.parted(look)
         points = film.apart(look) if apart else film.surface.points(look)
-        for part in self._parts:
-            part.move(points)
+        skin, flesh = self._parts
+        skin.move(points)
+        flesh.move(points, film.surface.bare(look))
         self._knife.points = blade_at(scene, look)[0]
         self._plot.render()
         return self._sheet.draw(self._plot.screenshot(return_img=True), look, apart=apart)
@@ -124,15 +122,19 @@ class _Part:
             cell_normals=False, split_vertices=True, feature_angle=SHARP, consistent_normals=False
         )
         self._used = np.array(self.mesh["vertex"])
+        self._triangles = np.array(self.mesh.regular_faces)
 
-    def move(self, points: np.ndarray) -> None:
-        """Put the vertices to where those of the whole surface (m, 3) are [m]."""
+    def move(self, points: np.ndarray, seen: np.ndarray | None = None) -> None:
+        """Put the vertices to where those of the whole surface (m, 3) are [m], and draw the triangles that are seen."""
         self.mesh.points = points[self._used]
-        self.mesh.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False, inplace=True)
+        if seen is not None:
+            self.mesh.regular_faces = self._triangles[seen]
+        if self.mesh.n_cells:
+            self.mesh.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False, inplace=True)
 
 
 def stills(film: Film, folder: Path) -> list[Path]:
-    """Draw the cut at contact, at the largest force and at its end: contact.png, peak.png, end.png.
+    """Draw the cut at contact, nearest to the largest force and at its end: contact.png, peak.png, end.png.
 
     Args:
         film: What to draw.

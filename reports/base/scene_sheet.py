@@ -50,6 +50,16 @@ def bar_ends(film: Film) -> np.ndarray:
     return np.array([[x, y, top], [x, y + bar_length(film.scene.food.shape.length), top]])
 
 
+def numbers(film: Film, look: Snapshot) -> tuple[str, str, str]:
+    """Stroke and force of a look, and the largest force of the cut: no look need be where that is."""
+    _, stroke, force = film.peak
+    return (
+        f"stroke {look.stroke * 1e3:.1f} mm",
+        f"force {film.force_at(look):.2f} N",
+        f"largest {force:.2f} N at {stroke * 1e3:.1f} mm",
+    )
+
+
 class Sheet:
     """Lays out pictures of a film.
 
@@ -90,10 +100,9 @@ class Sheet:
         name = film.food.replace("_", " ")
         figure.text(0.02, 0.945, name[:1].upper() + name[1:], fontsize=20, fontweight="bold", va="top")
         figure.text(0.02, 0.89, f"{film.scene.knife.name} knife", va="top", color=GREY)
-        numbers = f"stroke {look.stroke * 1e3:.1f} mm\nforce {film.force_at(look):.1f} N"
-        figure.text(0.02, 0.85, numbers, va="top", fontsize=14, linespacing=1.4)
+        figure.text(0.02, 0.855, "\n".join(numbers(film, look)), va="top", linespacing=1.4)
         if apart:
-            figure.text(0.02, 0.77, APART, va="top", color=GREY, fontsize=10)
+            figure.text(0.02, 0.765, APART, va="top", color=GREY, fontsize=10)
 
     def _section(self, figure: Figure, look: Snapshot) -> None:
         """The stress about the blade, in the section across its middle."""

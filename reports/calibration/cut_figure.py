@@ -1,4 +1,4 @@
-"""The picture of the cut: the food across the blade's middle, early, at the largest force and at the end."""
+"""The picture of the cut: the food across the blade's middle, early, nearest to the largest force and at the end."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ ABOUT = 0.8  # distance from the blade to which a glance goes, in heights of the
 MARGIN = 0.12  # room around the food, of its height
 TALLEST = 52.0  # of one picture [mm]
 LABELS = 14.0  # title and numbers of the axes, of a picture's height [mm]
+LINE = 3.5  # one more line of a title, of a picture's height [mm]
 LEAST = 18.0  # of one picture of several in a row [mm]
 AXIS = 14.0  # numbers and label at the left of a picture [mm]
 SCALE = 18.0  # scale of colours at the right, of a picture's width [mm]
@@ -37,7 +38,7 @@ Glance = Callable[[Axes], None]
 
 
 def moments(section: Section, stroke: np.ndarray, force: np.ndarray) -> list[tuple[int, str]]:
-    """Which looks are shown, and what each is called: early, at the largest force, at the end; none twice.
+    """Which looks are shown, and what each is called: early, nearest to the largest force, at the end; none twice.
 
     Args:
         section: The looks.
@@ -47,13 +48,22 @@ def moments(section: Section, stroke: np.ndarray, force: np.ndarray) -> list[tup
     Returns:
         Index of each look, in the order of time, and its name.
     """
-    peak = float(stroke[int(np.argmax(force))])
-    wanted = ((EARLY * float(section.stroke[-1]), ""), (peak, "largest force"), (math.inf, "at the end"))
+    nearest, title = _near_peak(section, stroke, force)
+    peak = float(section.stroke[nearest])
+    wanted = ((EARLY * float(section.stroke[-1]), ""), (peak, title), (math.inf, "at the end"))
     found: dict[int, str] = {}
     for at, name in wanted:
         k = int(np.argmin(np.abs(section.stroke - min(at, float(section.stroke[-1])))))
         found[k] = name or found.get(k, "")
     return sorted(found.items())
+
+
+def _near_peak(section: Section, stroke: np.ndarray, force: np.ndarray) -> tuple[int, str]:
+    """The look nearest to the largest force, and what it is called: that, or where the largest force is."""
+    peak = float(stroke[int(np.argmax(force))])
+    k = int(np.argmin(np.abs(section.stroke - peak)))
+    at, there = (f"{1e3 * place:.1f}" for place in (section.stroke[k], peak))
+    return k, "largest force" if at == there else f"near the\nlargest force at {there} mm"
 
 
 def cut(section: Section, knife: Knife, height: float, stroke: np.ndarray, force: np.ndarray) -> list[bytes]:
@@ -92,7 +102,11 @@ def cut(section: Section, knife: Knife, height: float, stroke: np.ndarray, force
         return min((WIDTH - SCALE - AXIS * count) / count * slender, TALLEST)
 
     rows = [shown] if tall(len(shown)) >= LEAST else [[look] for look in shown]
-    return [svg(partial(draw, looks=row), tall(len(row)) + LABELS) for row in rows]
+    titles = [max(name.count("\n") for _, name in row) for row in rows]
+    return [
+        svg(partial(draw, looks=row), tall(len(row)) + LABELS + LINE * more)
+        for row, more in zip(rows, titles, strict=True)
+    ]
 
 
 def _colours(section: Section, stroke: np.ndarray, force: np.ndarray) -> ScalarMappable:
@@ -102,7 +116,7 @@ def _colours(section: Section, stroke: np.ndarray, force: np.ndarray) -> ScalarM
 
 
 def glance(section: Section, knife: Knife, height: float, stroke: np.ndarray, force: np.ndarray) -> Glance:
-    """What draws the food about the blade at the largest force into given axes.
+    """What draws the food about the blade, in the look nearest to the largest force, into given axes.
 
     Args:
         section: The food across the blade's middle.
@@ -114,7 +128,7 @@ def glance(section: Section, knife: Knife, height: float, stroke: np.ndarray, fo
     Returns:
         What draws it.
     """
-    k = int(np.argmin(np.abs(section.stroke - float(stroke[int(np.argmax(force))]))))
+    k, title = _near_peak(section, stroke, force)
     half = min(float(np.abs(section.y[k]).max()) + MARGIN * height, ABOUT * height)
     colour = _colours(section, stroke, force)
 
@@ -124,7 +138,7 @@ def glance(section: Section, knife: Knife, height: float, stroke: np.ndarray, fo
         draw_tools(axes, knife, height - float(section.stroke[k]), top)
         axes.set(xlim=(-1e3 * half, 1e3 * half), ylim=(-1e3 * MARGIN * height, 1e3 * top), aspect="equal")
         axes.set(xlabel="across the blade [mm]", ylabel="height [mm]")
-        axes.set_title(f"largest force, {1e3 * float(section.stroke[k]):.1f} mm", loc="right")
+        axes.set_title(f"{1e3 * float(section.stroke[k]):.1f} mm deep, {title}", loc="right")
         axes.grid(visible=False)
         scale = axes.inset_axes(BESIDE)
         axes.figure.colorbar(colour, cax=scale, extend="max", label="von Mises stress [kPa]")

@@ -24,7 +24,7 @@ LEFT_OPEN = {
 }
 #: Independent readings of a curve that the search assumes: residuals hang together over a twentieth of the stroke.
 ASSUMED_READINGS = 20
-#: The line of the first page that the size of the residuals decides.
+#: The line of the verdict table that the size of the residuals decides.
 EXPLAINED = "curve explained by the food"
 #: What is another thing on the way up.
 LEFT_OPEN_UP = {"tare": "level of the force on the way up: that before contact, and the drift until then"}
@@ -107,7 +107,7 @@ def assumed_data(result: CalibrationResult, points: int) -> int:
 
 
 def _assumed(result: CalibrationResult, points: int) -> str:
-    """The chi-square by which the search goes, and which of the two the first page has; nothing where none is known."""
+    """The chi-square by which the search goes, and that of the verdict table; nothing where none is known."""
     if not result.history.misfit_history:
         return ""
     least, data = result.history.misfit_history[-1][1], assumed_data(result, points)
@@ -118,4 +118,4 @@ def _assumed(result: CalibrationResult, points: int) -> str:
     )
     if result.sampled is not None or not any(v.name == EXPLAINED for v in result.verdicts):
         return said
-    return f"{said} The line “{EXPLAINED}” of the first page has the less probable of these two chi-squares."
+    return f"{said} The line “{EXPLAINED}” of the verdict table has the less probable of these two chi-squares."

@@ -53,6 +53,14 @@
     return found.map((value) => ({ value, text: number(value, places) }));
   }
 
+  // Round numbers up an axis: two at least, for one alone has no scale.
+  function upward(panel) {
+    for (let wanted = panel.height / 45; ; wanted *= 1.3) {
+      const found = ticks(panel.low, panel.high, wanted);
+      if (found.length > 1) return found;
+    }
+  }
+
   // Powers of ten, where the way across is told by its logarithm.
   function decades() {
     const found = [];
@@ -83,7 +91,7 @@
 
   function axes(panel, title, group) {
     const left = frame.left, right = frame.width - frame.right;
-    ticks(panel.low, panel.high, panel.height / 45).forEach((tick) => {
+    upward(panel).forEach((tick) => {
       const y = panel.y(tick.value);
       make(group, "line", { class: "grid", x1: left, x2: right, y1: y, y2: y });
       make(group, "text", { x: left - 6, y: y + 4, "text-anchor": "end" }, tick.text);

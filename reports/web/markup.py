@@ -15,6 +15,8 @@ from typing import Any
 
 VOID = frozenset({"br", "img", "input", "meta", "wbr"})
 """Elements that have no content and no end."""
+LISTED = "all"
+"""Name of the table that scrolls by itself where a screen is too narrow."""
 SOFT_BREAK = "\u200b"
 """Where a long word may break in texts of the typesetter."""
 
@@ -63,7 +65,10 @@ def _html(text: str) -> str:
 
 
 def table(head: Sequence[Part], rows: Iterable[Sequence[Part]], numbers: Iterable[int] = (), **more: str) -> Markup:
-    """A table whose first cell of each row is its heading; it scrolls by itself where a screen is too narrow.
+    """A table whose first cell of each row is its heading.
+
+    Where a screen is too narrow the cells of a row flow below its heading, each after the title of its column; the long
+    list of members scrolls instead.
 
     Args:
         head: Titles of the columns.
@@ -74,12 +79,14 @@ def table(head: Sequence[Part], rows: Iterable[Sequence[Part]], numbers: Iterabl
     Returns:
         The table.
     """
+    listed = more.get("id") == LISTED
     right = {k: "number" for k in numbers}
     top = element("tr", *(element("th", cell, scope="col", class_=right.get(k)) for k, cell in enumerate(head)))
+    titles = [None if listed else cell for cell in head]
     body = []
     for row in rows:
         cells = [element("th", row[0], scope="row")]
-        cells += [element("td", cell, class_=right.get(k)) for k, cell in enumerate(row[1:], 1)]
+        cells += [element("td", cell, class_=right.get(k), data_head=titles[k]) for k, cell in enumerate(row[1:], 1)]
         body.append(element("tr", *cells))
     drawn = element("table", element("thead", top), element("tbody", *body), id=more.get("id"))
     return element("div", drawn, class_="wide", role="region", tabindex="0", aria_label=more.get("label"))

@@ -21,9 +21,11 @@ WHAT = (
     "The draws behind the 95 % band are not stored."
 )
 NEAREST = "The best values need not be those nearest to the trace: the fit weighs its peak and the literature as well."
-COARSE = (
-    "A member on the coarse grid comes from the screening, with larger cells: its force is not that of the same values "
-    "on the fine grid."
+GRIDS = {"fine": "grid that counts", "coarse": "screening grid"}
+"""What the grids of a store are called."""
+SCREENED = (
+    "A member on the screening grid has larger cells and a faster blade: its force is not that of the same values on "
+    "the grid that counts."
 )
 NONE = "No curves of single simulations are stored in this folder, so there is no member to pick."
 
@@ -60,13 +62,14 @@ def members_section(fitted: Fitted, members: Members | None) -> Markup:
     if members is None or not members.shown:
         return element("section", element("h2", "Members"), element("p", NONE), id="members")
     shown = members.shown
-    count = f"{len(shown)} of {members.stored} are here, those on the fine grid and the nearest to the trace first."
-    coarse = COARSE if any(m.grid == "coarse" for m in shown) else ""
+    first = f"those on the {GRIDS['fine']} and the nearest to the trace first"
+    count = f"{len(shown)} of {members.stored} are here, {first}."
+    screened = SCREENED if any(m.grid == "coarse" for m in shown) else ""
     return element(
         "section",
         element("h2", "Members"),
         element("p", WHAT),
-        element("p", " ".join(filter(None, (count, NEAREST, coarse)))),
+        element("p", " ".join(filter(None, (count, NEAREST, screened)))),
         _all(shown, fitted),
         id="members",
     )
@@ -74,7 +77,7 @@ def members_section(fitted: Fitted, members: Members | None) -> Markup:
 
 def named(member: Member) -> str:
     """What a member is called: its number, grid, agreement, and what it is known for."""
-    text = f"{member.number}: {member.grid} grid, NRMSE {_nrmse(member)}, peak {quantity(member.peak_N, 'N')}"
+    text = f"{member.number}: {GRIDS[member.grid]}, NRMSE {_nrmse(member)}, peak {quantity(member.peak_N, 'N')}"
     known = ["the best values"] * member.best
     known += [f"best of mode {k}" for k in member.modes]
     return f"{text}; {', '.join(known)}" if known else text
@@ -116,7 +119,7 @@ def _all(shown: tuple[Member, ...], fitted: Fitted) -> Markup:
     for k, m in enumerate(shown):
         pick = element("button", str(m.number), type="button", data_member=str(k), aria_label=f"pick member {named(m)}")
         known = ", ".join([*(["best values"] * m.best), *(f"mode {i}" for i in m.modes)])
-        rows.append([pick, m.grid, known, _nrmse(m), quantity(m.peak_N, "N"), *_values(m, fitted)])
+        rows.append([pick, GRIDS[m.grid], known, _nrmse(m), quantity(m.peak_N, "N"), *_values(m, fitted)])
     head = ("Member", "Grid", "Known as", "NRMSE", "Peak", *fitted)
     numbers = range(3, 5 + len(fitted))
     listed = table(head, rows, numbers, id="all", label="All members")

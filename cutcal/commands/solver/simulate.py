@@ -364,17 +364,17 @@ def _draw(
     if args.page:
         say("writing cut.html")
         page(
-            replace(film, looks=watch.taken[FRAMES_PER_PAGE_FRAME - 1 :: FRAMES_PER_PAGE_FRAME]),
+            replace(film, looks=film.looks[::FRAMES_PER_PAGE_FRAME]),
             out / "cut.html",
             f"{food}, {film.scene.knife.name} knife",
         )
     if args.video:
-        rest = Countdown(len(watch.taken))
+        rest = Countdown(len(film.looks))
 
         def told(done: int) -> None:
             left = rest.left(1.0)
             if done % FRAMES_PER_LINE == 0:
-                say(f"drawing cut.mp4: {done} of {len(watch.taken)} pictures, {left}")
+                say(f"drawing cut.mp4: {done} of {len(film.looks)} pictures, {left}")
 
         say("drawing cut.mp4")
         video(film, out / "cut.mp4", told)

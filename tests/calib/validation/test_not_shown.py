@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from calib.material.food import load_food
 from calib.uncertainty.estimates import FittedParameter
+from calib.validation.acceptance import Verdict
 from calib.validation.not_shown import limits
 
 
@@ -31,3 +32,10 @@ def test_the_name_of_a_column_keeps_its_letters() -> None:
     """Only a sentence that begins with a word begins with a capital."""
     told = said({}, ("base_Fz_N: the sign was turned", "the width is assumed"))
     assert "base_Fz_N: the sign was turned." in told and "The width is assumed." in told
+
+
+def test_a_line_that_failed_is_looked_up_in_the_verdict_table() -> None:
+    """Report and page both have that; only one of them has a first page."""
+    failed = Verdict("peak force error", 0.2, 0.05, "fraction", False, "")
+    told = limits("measured", "position", "air", [failed], {}, (), load_food("banana"))
+    assert "peak force error: failed; see the verdict table." in told

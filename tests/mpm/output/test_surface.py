@@ -111,3 +111,22 @@ def test_a_watch_looks_at_even_parts_of_a_run_and_sees_the_cut() -> None:
     end = surface.points(looks[-1])
     assert end[:, 2].min() > -0.5e-3
     assert enclosed(end, surface.triangles) == pytest.approx(volume(PRISM.food.shape), rel=0.02)
+
+
+@pytest.mark.parametrize(("kind", "ends"), [("cylinder", 2), ("ellipsoid", 0)])
+def test_flesh_is_seen_on_flat_ends_and_where_the_cut_has_reached(kind: str, ends: int) -> None:
+    """A food with parallel sides is a piece of a longer one: its ends are flesh before anything is cut. Of the faces a
+    whole food shows nothing, one cut down to half its height the upper half, and one cut through all."""
+    scene = replace(PRISM, food=replace(PRISM.food, shape=Shape(kind, 0.03, 0.024, 0.024)))
+    seeds = seed(scene)
+    surface = Surface(scene.food.shape, seeds, scene.mirrors)
+    flesh, blank = surface.parts[1], np.zeros(len(seeds.x))
+    y, z = (surface.rest[flesh][:, :, k].mean(axis=1) for k in (1, 2))
+    for depth in (0.0, 0.012, 0.024):
+        look = Snapshot(0.0, depth, 0.0, seeds.x, blank, seeds.x[:, 2] > 0.024 - depth)
+        seen = surface.bare(look)
+        assert seen[np.abs(y) > 1e-3].all() and len(np.unique(np.sign(y[np.abs(y) > 1e-3]))) == ends
+        on_face = np.abs(y) < 1e-3
+        assert seen[on_face & (z > 0.027 - depth)].all() and not seen[on_face & (z < 0.021 - depth)].any()
+    left, right = surface.rest[surface.rims].transpose(1, 0, 2)
+    np.testing.assert_allclose(left, right, atol=1e-12)

@@ -209,11 +209,17 @@ def looked_at(width: float = 0.1, height: float = 0.03) -> Section:
 
 
 def test_three_moments_of_the_cut_are_shown() -> None:
-    """Early, at the largest force, at the end; a force that is largest at the end makes two."""
+    """Early, nearest to the largest force, at the end; a force that is largest at the end makes two. Where no look is
+    at the largest force, its name says at which stroke that is."""
     stroke = np.linspace(0, 0.02, 50)
     section = looked_at()
     shown = pictures.moments(section, stroke, np.sin(np.pi * stroke / 0.024))
-    assert [name for _, name in shown] == ["", "largest force", "at the end"]
+    peak = stroke[np.argmax(np.sin(np.pi * stroke / 0.024))]
+    assert f"{1e3 * peak:.1f}" != f"{1e3 * section.stroke[shown[1][0]]:.1f}"
+    near = f"near the\nlargest force at {1e3 * peak:.1f} mm"
+    assert [name for _, name in shown] == ["", near, "at the end"]
+    there = pictures.moments(section, section.stroke, np.sin(np.pi * section.stroke / 0.024))
+    assert [name for _, name in there] == ["", "largest force", "at the end"]
     assert section.stroke[shown[0][0]] == pytest.approx(4e-3) and section.stroke[shown[1][0]] == pytest.approx(12e-3)
     assert len(pictures.moments(section, stroke, stroke)) == 2
 
@@ -246,14 +252,15 @@ def printed(pdf: Path) -> str:
 def test_the_glance_on_the_first_page_is_the_food_about_the_blade_at_the_largest_force(
     height: float, length: float
 ) -> None:
-    """A long food is shown to 0.8 heights from the blade, a short one whole; the blade stands at the stroke of the
-    largest force."""
+    """A long food is shown to 0.8 heights from the blade, a short one whole; the blade stands at the look nearest to
+    the largest force, and the title says where both are."""
     stroke = np.linspace(0.0, 0.02, 50)
     section = looked_at(length, height)
     axes = Figure().subplots()
     pictures.glance(section, KNIFE, height, stroke, np.sin(np.pi * stroke / 0.024))(axes)
     deep = section.stroke[np.argmin(np.abs(section.stroke - 0.012))]
-    assert axes.get_title(loc="right") == f"largest force, {1e3 * deep:.1f} mm"
+    peak = stroke[np.argmax(np.sin(np.pi * stroke / 0.024))]
+    assert axes.get_title(loc="right") == f"{1e3 * deep:.1f} mm deep, near the\nlargest force at {1e3 * peak:.1f} mm"
     edge = axes.patches[0].get_xy()[0]
     np.testing.assert_allclose(edge, [0.0, 1e3 * (height - deep)])
     reach = min(np.abs(section.y).max() + 0.12 * height, 0.8 * height)

@@ -197,10 +197,10 @@ def test_both_chi_squares_have_their_number_of_data(content: Content) -> None:
     assert measurement.ASSUMED_READINGS == round(1.0 / ErrorModel().correlation)
     said = spaced(content()["errors"][1])
     assert "Reduced chi-square 1.30 of the curve's 16 readings and the peak" in said
-    assert "is 18.5 for 21 independent data (curve and peak), 0.881 each" in said and "first page" not in said
+    assert "is 18.5 for 21 independent data (curve and peak), 0.881 each" in said and "verdict table" not in said
     assert content()["misfit_data"] == "21"
     line = {**sample.summary()["verdicts"][0], "name": "curve explained by the food"}
-    assert "has the less probable of these two" in content(verdicts=[line])["errors"][1]
+    assert "of the verdict table has the less probable of these two" in content(verdicts=[line])["errors"][1]
     assert "independent data" not in content(misfit_history=[])["errors"][1]
     up = WithdrawalAgreement(from_m=2e-3, to_m=0.02, speed_m_s=0.02, peak_real_N=0.3, peak_sim_N=0.3, nrmse=0.03,
                              work_real_J=1e-3, work_sim_J=1e-3)  # fmt: skip

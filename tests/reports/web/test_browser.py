@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from calib.calibration.report import write_report
@@ -61,6 +62,18 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_study_report(folder).with_suffix(".html")
 
 
+@pytest.fixture(scope="module")
+def compression(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of a compression, whose residual is a part of a kilopascal."""
+    folder = tmp_path_factory.mktemp("compression")
+    curves = curves_of(("R0", 1e5 * STRAIN), ("R1", 1.2e5 * STRAIN), fitted=1.1e5 * STRAIN + 670 * np.sin(9 * STRAIN))
+    write_figure(result(), curves, folder)
+    (folder / "compress.json").write_text("{}")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(base, "publish", lambda *_, **__: None)
+        return write_compression(result(), curves, folder).with_suffix(".html")
+
+
 def tip(shown: Tab) -> dict[str, str]:
     """What the box at the cursor says, by name."""
     texts = "[...row.children].map(one => one.innerText)"
@@ -112,6 +125,43 @@ def test_a_page_is_whole_at_each_width(shown: Tab, request: pytest.FixtureReques
     assert shown.ask("document.documentElement.scrollWidth") <= width
     chart, body = (shown.ask(f"document.querySelector('{name}').clientWidth") for name in ("#chart", "main"))
     assert chart == pytest.approx(body, abs=2.0)
+
+
+@pytest.mark.parametrize("kind", ["run", "study", "compression"])
+@pytest.mark.parametrize("width", WIDTHS)
+def test_tables_are_read_without_scrolling(shown: Tab, request: pytest.FixtureRequest, kind: str, width: int) -> None:
+    """Each cell lies within the page, and no row is higher than its texts. On a phone each cell follows the title of
+    its column; on a screen a verdict stands in its column."""
+    shown.open(request.getfixturevalue(kind), width)
+    wide = "[...document.querySelectorAll('.wide')].filter((one) => one.offsetHeight && !one.querySelector('#all'))"
+    assert shown.ask(f"{wide}.length") > 0
+    cells = f"{wide}.flatMap((one) => [...one.querySelectorAll('td')])"
+    ends = shown.ask(f"{cells}.filter((one) => one.offsetHeight).map((one) => one.getBoundingClientRect().right)")
+    assert ends and (width > 360 or max(ends) <= width)
+    high = "(row) => row.offsetHeight - Math.max(...[...row.cells].map((one) => {"
+    high += "const r = document.createRange(); r.selectNodeContents(one); const b = r.getBoundingClientRect();"
+    high += "return b.height ? b.bottom - row.getBoundingClientRect().top : 0; }))"
+    rows = shown.ask(f"{wide}.flatMap((one) => [...one.querySelectorAll('tbody tr')].map({high}))")
+    assert max(rows) < 15  # px: less than a line
+    marks = shown.ask("[...document.querySelectorAll('.wide .yes, .wide .no, .wide .none')].filter((one) => "
+                      "one.offsetHeight).map((one) => one.getBoundingClientRect().right)")  # fmt: skip
+    assert marks and (width > 360 or max(marks) <= width)
+    titles = shown.ask(f"{cells}.map((one) => getComputedStyle(one, '::before').content)")
+    assert (len(set(titles)) > 2) == (width == 360)
+
+
+@pytest.mark.parametrize("kind", ["run", "study", "compression"])
+@pytest.mark.parametrize("width", WIDTHS)
+def test_an_axis_has_two_numbers_at_least(shown: Tab, request: pytest.FixtureRequest, kind: str, width: int) -> None:
+    """One number alone, the zero of a residual, says nothing of its size, however large that is."""
+    shown.open(request.getfixturevalue(kind), width)
+    numbers = "[...document.querySelectorAll('#chart text[text-anchor=end]')].map((one) => "
+    numbers += "[Number(one.getAttribute('y')), one.textContent.replace('\u2212', '-')])"
+    lower = "Number(document.querySelector('#lower rect').getAttribute('y'))"
+    for text in shown.ask(numbers)[-1:]:
+        assert "[" in text[1]  # the name of the axis across
+    marks = [float(text) for y, text in shown.ask(numbers)[:-1] if y > shown.ask(lower)]
+    assert len(marks) >= 2 and len(set(marks)) == len(marks)
 
 
 def test_pointing_at_a_curve_shows_its_values(shown: Tab, run: Path) -> None:

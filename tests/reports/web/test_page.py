@@ -62,6 +62,22 @@ def whole(run: Path) -> Page:
     return Page(run / "report.html")
 
 
+# ---- words
+
+
+def test_the_page_speaks_of_what_it_has_in_the_words_of_the_glossary(whole: Page) -> None:
+    """It has no pages to number, and calls the grids what glossary and PDF call them."""
+    assert "first page" not in whole.text and not re.search(r"\b(coarse|fine) grid", whole.text)
+    known = (ROOT / "docs/glossary.md").read_text(encoding="utf-8")
+    assert "### Screening grid" in known and "*grid that counts*" in known
+    cells = {row[1] for row in whole.tables["all"][1:]}
+    assert (
+        cells
+        == {"screening grid", "grid that counts"}
+        == set(re.findall(r"screening grid|grid that counts", whole.text))
+    )
+
+
 # ---- one file
 
 
@@ -199,7 +215,7 @@ def test_members_have_their_curves_and_values(run: Path, whole: Page) -> None:
     drawn, texts, rows = whole.data["curves"]["members"], whole.data["texts"], whole.tables["all"][1:]
     assert len(drawn) == len(texts["values"]) == len(rows) == 12
     grids = [row[1] for row in rows]
-    assert grids == ["fine"] * 9 + ["coarse"] * 3
+    assert grids == ["grid that counts"] * 9 + ["screening grid"] * 3
     best = [k for k, row in enumerate(rows) if row[2] == "best values"]
     assert len(best) == 1
     result, stroke = read_result(run), sample.curves()["stroke_m"]
@@ -276,7 +292,7 @@ def test_markup_escapes_what_it_did_not_make() -> None:
     inner = element("b", "a < b")
     assert element("p", inner, " & ", title='"x"') == '<p title="&quot;x&quot;"><b>a &lt; b</b> &amp; </p>'
     assert element("input", hidden=True, checked=False, type="range") == '<input hidden type="range">'
-    assert "<td>&lt;i&gt;</td>" in table(("a", "b"), [["x", "<i>"]])
+    assert '<td data-head="&lt;b&gt;">&lt;i&gt;</td>' in table(("a", "<b>"), [["x", "<i>"]])
 
 
 def test_templates_are_part_of_the_package() -> None:
