@@ -55,7 +55,8 @@ def test_the_model_is_said_as_in_a_calibration(tmp_path: Path) -> None:
     assert laws["Board"] == "contact without adhesion, Coulomb friction 0.500"
     assert "24.8 kPa" in laws["Crack"]  # 0.8 of the fitted yield stress
     assert [letter for letter, _ in w["conditions"]] == ["A", "B", "C", "D", "E", "G"]
-    assert "0.0100 of the speed of pressure waves in the food, 260 mm/s, where the trace has 20 mm/s" in spaced(w["conditions"][0][1])
+    blade = spaced(w["conditions"][0][1])
+    assert "0.0100 of the speed of pressure waves in the food, 260 mm/s, where the trace has 20 mm/s" in blade
     with h5py.File(run / "record-first.h5", "w") as file:
         file.attrs.update(images=4, dt=8.2e-5, steps=1406)
     four = content(read_study(run, MEANINGS, cited))["model"]["conditions"]
