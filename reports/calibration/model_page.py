@@ -273,9 +273,11 @@ def _conditions(result: CalibrationResult) -> list[list[str]]:
 def _speed(result: CalibrationResult) -> str:
     """The simulated speed, and that of the trace."""
     cut, trace = result.cut, result.conditioning
+    if cut.mach is None:
+        return "a speed that its older files do not say"
     said = f"{quantity(cut.mach, '-')} of the speed of pressure waves in the food"
     E, nu, rho = (_value(result, name) for name in ("E", "nu", "rho"))
-    if None not in (E, nu, rho) and cut.mach is not None:
+    if None not in (E, nu, rho):
         at = cut.mach * Material(E=E, nu=nu, rho=rho).p_wave
         said += f", {quantity(at, 'm/s', digits=2)}"
         real = cut.speed_real_m_s
