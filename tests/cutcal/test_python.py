@@ -78,8 +78,8 @@ def test_the_documented_script_runs(folder: Path) -> None:
 @pytest.mark.slow
 def test_results_load_back(folder: Path) -> None:
     """A finished folder gives summary, tables, food and report, and says how it was made."""
-    result = Calibration.load(folder / "runs" / "banana")
-    summary = json.loads((folder / "runs" / "banana" / "summary.json").read_text())
+    result = Calibration.load(folder / "runs" / "python")
+    summary = json.loads((folder / "runs" / "python" / "summary.json").read_text())
     assert result.summary == summary and result.passed is summary["passed"]
     assert list(result.parameters.index) == ["E", "R"]
     assert result.parameters.loc["R", "value"] == summary["parameters"]["R"]["value"]
@@ -89,7 +89,7 @@ def test_results_load_back(folder: Path) -> None:
     )
     assert result.report.read_bytes().startswith(b"%PDF")
     assert summary["trace"]["source"] == "banana_reconstructed.csv"
-    call = "Calibration('banana', trace=Trace('banana_reconstructed.csv'), height=0.033).run('runs/banana')"
+    call = "Calibration('banana', trace=Trace('banana_reconstructed.csv'), height=0.033).run('runs/python')"
     assert summary["command"] == [call]
     assert len(repr(result)) < 200
 
