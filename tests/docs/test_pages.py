@@ -234,6 +234,17 @@ def test_what_the_readme_shows_in_python_can_be_called() -> None:
         assert all(hasattr(importlib.import_module(module), name.strip()) for name in names.split(","))
 
 
+def test_a_shell_finds_the_commands_of_the_readme() -> None:
+    """What is installed into a folder is called by it, until the folder is on the PATH."""
+    blocks = re.findall(r"^```bash\n(.*?)^```", read(README), flags=re.MULTILINE | re.DOTALL)
+    lines = "".join(blocks).splitlines()
+    active = lines.index("source .venv/bin/activate")
+    assert not [line for line in lines[:active] if re.match(r"(cutcal|calibrate|pip|pytest) ", line)]
+    assert [line for line in lines[active:] if line.startswith("calibrate ")]
+    before = read(README).partition("source .venv/bin/activate")[0]
+    assert "`cutcal doctor`" not in before and "`.venv/bin/python`" in before
+
+
 @pytest.mark.parametrize("path", [README, DOCS / "python.md"], ids=name_of)
 def test_the_first_python_of_a_page_runs_after_the_commands_of_the_readme(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
