@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib.errors import TraceError
-from calib.io.wording import LONG, brief, quoted
+from calib.io.wording import LONG, brief, listed, quoted
 from calib.table.table import Table, rows_at
 from calib.trace.clock import running_clock
 from calib.trace.columns import Column, candidates, choose, is_sparse, numbers, without_empty
-from calib.trace.names import COUNTERS, stem_of
+from calib.trace.names import COUNTERS, meaning, named_like, not_measured, stem_of
 
 MIN_SAMPLES = 20
 """Fewest samples of a trace: below this, baseline, onset and ramp have under seven samples each."""
@@ -25,6 +26,8 @@ MOST_LETTERS = 450
 """Of an error that says two things at once; a longer one says the first alone."""
 ROWS = "the rows"
 """What the time is called where rows are counted."""
+MOST_UNUSED = 5
+"""Names that a note on unused columns shows of those that nothing is said of."""
 RISING = 0.1
 """Part of a position's range by which it rises with the force if it is no height."""
 TURNED = 0.2
@@ -123,6 +126,7 @@ def recorded(table: Table, how: Reading) -> Recorded:
     start = float(clock.time[0]) if abs(clock.time[0]) > CLOCK_START_S else 0.0
     used = {"time": time, "force": force} | ({} if position is None else {"position": position})
     notes = (*table.notes, *said, *(note for column in used.values() for note in column.notes), *sparse)
+    notes += _unused(table, [column.name for column in used.values()], how, notes)
     return Recorded(
         time=clock.time - start,
         force=f,
@@ -223,6 +227,45 @@ def _position_column(table: Table, how: Reading) -> Column | None:
     if how.position_col == DISABLED or (how.position_col is None and not candidates(table, "position")):
         return None
     return choose(table, "position", how.position_col)
+
+
+def _unused(table: Table, used: Sequence[str], how: Reading, said: Sequence[str]) -> tuple[str, ...]:
+    """A sentence on the columns that are not read, with what could be the knife's place first, or nothing.
+
+    Args:
+        table: The table.
+        used: Names of the columns that are read.
+        how: How the record is read.
+        said: What was said before: a column that it names is not named again. Numbers of rows are not named at all.
+
+    Returns:
+        The sentence, or nothing where all columns are read.
+    """
+    words = [note.removeprefix(f"{table.source}: ") for note in said]
+    names = [
+        name
+        for name in table.columns
+        if name not in used
+        and not any(re.search(rf"(?<!\w){re.escape(brief(name, LONG))}(?!\w)", text) for text in words)
+        and not (stem_of(name) in {*COUNTERS, "", "unnamed_0"} and _counts(table, name))
+    ]
+    asked = how.position_col is None and how.depth_col is None
+    free = [name for name in names if not not_measured(name)] if asked and len(used) < 3 else []
+    lengths = [name for name in free if (unit := meaning(table, name).measure) and unit.fits("position")]
+    bare = [name for name in free if not meaning(table, name).unit and named_like(stem_of(name), "position")]
+    parts = []
+    if lengths:
+        what = ("a length", "it") if len(lengths) == 1 else ("lengths", "one")
+        hint = f"{what[0]}; --position-col takes {what[1]} as the knife's height, --depth-col as its depth"
+        parts.append(f"{listed(lengths, LONG)} ({hint})")
+    if bare:
+        hint = f"no unit; if it is the knife's place: --position-col {quoted(f'{brief(bare[0])}=mm')}"
+        parts.append(f"{listed(bare, LONG)} ({hint})")
+    others = [name for name in names if name not in (*lengths, *bare)]
+    if others:
+        more = len(others) - MOST_UNUSED
+        parts.append(listed(others[:MOST_UNUSED], LONG) + (f" and {more} more columns" if more > 0 else ""))
+    return (f"{table.source}: not used: {', '.join(parts)}",) if parts else ()
 
 
 def _on_the_forces_rows(
