@@ -11,10 +11,11 @@ from typing import Any
 
 import pandas as pd
 
+from calib.arguments import check_flag, listeners
 from calib.calibration.result import SUMMARY, read_result, read_summary
 from calib.calibration.result import CalibrationResult as CalibrationResult
 from calib.errors import OutputError
-from calib.io.progress import Progress, ProgressBar
+from calib.io.progress import Progress
 from calib.io.wording import as_arguments, brief, in_arguments, speaking_of_arguments
 from calib.material.food import FoodSpec
 from calib.material.scene import MID_LENGTH, Sizing
@@ -265,12 +266,12 @@ class Calibration:
 
         request = self.request("" if out is None else out)
         folder = Path(f"cutcal-{request.food.name}-{request.stem}" if out is None else out)
-        say = in_arguments(say)
         with speaking_of_arguments(), script_hidden(), ExitStack() as shown:
+            told = listeners("Calibration.run", progress, say, shown)
+            check_flag("Calibration.run", "resume", resume)
+            say = in_arguments(say)
             pool = shown.enter_context(workers_for(self.workers, self.arch, self.scheduler, say))
-            if isinstance(progress, bool):
-                progress = shown.enter_context(ProgressBar()) if progress else None
-            return run(request, folder, pool, resume=resume, progress=progress, say=say)
+            return run(request, folder, pool, resume=resume, progress=told, say=say)
 
     def check(self, png: str | Path | None = None) -> str:
         """How the trace is read and what would be fitted, as ``calibrate --check`` says it; nothing is simulated.

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from calib.api import LIMITS, Calibration, script_hidden, workers_for
+from calib.arguments import check_flag, listeners
 from calib.calibration.parameter_table import ParameterTable, parameter_table
 from calib.calibration.run_folder import RunFolder
 from calib.io.folder import finite
-from calib.io.progress import Progress, ProgressBar
+from calib.io.progress import Progress
 from calib.io.typed_document import to_document
 from calib.io.wording import brief, in_arguments, speaking_of_arguments
 from mpm.runtime import ARCHES
@@ -150,14 +151,14 @@ class Study:
             + [f"{name}={value!r}" for name, value in (("budget", budget), ("arch", arch)) if value is not None]
         )
         folder = Path((self.folder or f"cutcal-{self.spec.food.name}") if out is None else out)
-        say = in_arguments(say)
         with speaking_of_arguments(), script_hidden(), ExitStack() as shown:
+            told = listeners("Study.run", progress, say, shown)
+            check_flag("Study.run", "resume", resume)
+            say = in_arguments(say)
             device = self._device(workers, budget, arch)
             study = self.spec.run_with(budget=budget, arch=device, command=(f"{self.call}.run({call})",))
             pool = shown.enter_context(workers_for(workers, device, scheduler, say))
-            if isinstance(progress, bool):
-                progress = shown.enter_context(ProgressBar()) if progress else None
-            result = run(study, folder, pool, resume=resume, progress=progress, say=say)
+            result = run(study, folder, pool, resume=resume, progress=told, say=say)
         return StudyRun(folder, result)
 
     def _device(self, workers: int | None, budget: float | None, arch: str | None) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import io
+import re
 from dataclasses import fields
 from inspect import signature
 from pathlib import Path
@@ -23,7 +24,7 @@ from calib.io.wording import as_arguments, in_arguments
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_file import Header, StoredEvaluation, hdf5_of
 from calib.validation.acceptance import Verdict
-from cutcal import Calibration, Food, Trace
+from cutcal import Calibration, Food, Study, Trace
 from cutcal.commands.calibration.calibrate import add_args
 from mpm.scene.errors import CutcalError
 from tests.data_dir import ROOT
@@ -130,6 +131,28 @@ def test_stages_and_folders_speak_of_arguments(tmp_path: Path) -> None:
     with pytest.raises(CutcalError) as caught:
         Calibration("banana", BANANA).run(tmp_path / "there")
     assert "there" in str(caught.value) and "--" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ({"progress": 5}, "progress = 5; give True for a bar, or a function"),
+        ({"say": "print"}, "say = 'print'; give a function"),
+        ({"resume": "yes"}, "resume = 'yes'; give True or False"),
+    ],
+)
+def test_listeners_are_tried_before_anything_is_simulated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: dict[str, Any], words: str
+) -> None:
+    """One that cannot be called, of a calibration and of a study, leaves no folder behind."""
+    for module in ("calibration", "multi_specimen"):
+        monkeypatch.setattr(f"calib.{module}.run.run", lambda *_, **__: pytest.fail("the run began"))
+    study = tmp_path / "study.yaml"
+    study.write_text(f"food: banana\ntraces:\n  a: {{trace: {BANANA}}}\n  b: {{trace: {BANANA}}}\n")
+    for one in (Calibration("banana", BANANA), Study.read(study)):
+        with pytest.raises(CutcalError, match=re.escape(f"{type(one).__name__}.run: {words}")):
+            one.run(tmp_path / "out", **how)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_notebook_rewrites_its_line() -> None:
