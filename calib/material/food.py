@@ -372,14 +372,14 @@ def load_material_file(path: Path | str) -> FoodSpec:
 def _read_food(place: Place, raw: Any, own: bool = False) -> FoodSpec:
     """A food as a file has it; what a file of one's own leaves out has a default."""
     food = mapping(place, raw)
-    check_keys(place, food, ("shape", "properties"), ("not_modelled", *INCLUSIONS))
+    check_keys(place, food, ("shape",) if own else ("shape", "properties"), ("properties", "not_modelled", *INCLUSIONS))
     said = text(place.at("not_modelled"), food["not_modelled"]) if "not_modelled" in food else None
     shape = mapping(place.at("shape"), food["shape"])
-    given = mapping(place.at("properties"), food["properties"])
+    none = own and food.get("properties") is None
+    given = {} if none else mapping(place.at("properties"), food["properties"])
     check_keys(place.at("shape"), shape, ("kind", *DIMENSIONS), tuple(FORM), SYNONYMS)
     needed = [] if own else [n for n in PROPERTIES if n not in _OPTIONAL]
-    optional = [n for n in PROPERTIES if n not in needed]
-    check_keys(place.at("properties"), given, needed, optional, SYNONYMS)
+    check_keys(place.at("properties"), given, needed, PROPERTIES, SYNONYMS)
     dims = {n: read_property(place.at("shape"), n, shape[n]) for n in DIMENSIONS}
     form = {n: read_property(place.at("shape"), n, shape[n]) for n in FORM if n in shape}
     held = {n: _read_sizes(place.at(n), food[n]) for n in INCLUSIONS if n in food}
