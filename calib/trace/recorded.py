@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from calib.trace.clock import running_clock
 from calib.trace.columns import Column, candidates, choose, is_sparse, numbers, without_empty
 from calib.trace.names import COUNTERS, meaning, named_like, not_measured, stem_of
 
+Chosen = TypeVar("Chosen")
 MIN_SAMPLES = 20
 """Fewest samples of a trace: below this, baseline, onset and ramp have under seven samples each."""
 CLOCK_START_S = 1000.0
@@ -106,8 +108,7 @@ def recorded(table: Table, how: Reading) -> Recorded:
     Raises:
         TraceError: A column or a cell cannot be used; the message names file, column and row.
     """
-    time, said, force = _time_and_force(table, how)
-    position = _position_column(table, how)
+    time, said, force, position = _chosen(table, how)
     if how.sign is not None:
         force = replace(force, factor=abs(force.factor) * parse_sign(how.sign))
     table = without_empty(table, [column for column in (time, force, position) if column is not None])
@@ -152,26 +153,39 @@ def parse_sign(sign: str | int) -> float:
     return signs[str(sign)]
 
 
-def _time_and_force(table: Table, how: Reading) -> tuple[Column, list[str], Column]:
-    """The columns of the time and of the force, and what was said of the time.
+def _chosen(table: Table, how: Reading) -> tuple[Column, list[str], Column, Column | None]:
+    """The columns of the time, of the force and of the knife's place, and what was said of the time.
 
     Raises:
-        TraceError: One cannot be used, or both: it is then said of both at once.
+        TraceError: One of them cannot be used, or several: it is then said of all at once, as far as it is short.
     """
-    try:
-        time, said = _time_column(table, how)
-    except TraceError as missing:
+    refused: list[TraceError] = []
+
+    def tried(choice: Callable[[], Chosen]) -> Chosen | None:
         try:
-            choose(table, "force", how.force_col)
-        except TraceError as also:
-            first = str(missing).split("; ")
-            other = str(also).removeprefix(f"{table.source}: ")
-            more = [text for text in other.split("; ") if text not in first]
-            both = f"{missing}; and {'; '.join(more)}"
-            if more and str(also) != str(missing) and len(both) <= MOST_LETTERS:
-                raise TraceError(both) from None
-        raise
-    return time, said, choose(table, "force", how.force_col)
+            return choice()
+        except TraceError as error:
+            refused.append(error)
+            return None
+
+    time = tried(lambda: _time_column(table, how))
+    force = tried(lambda: choose(table, "force", how.force_col))
+    position = tried(lambda: _position_column(table, how))
+    if refused or time is None or force is None:
+        raise _at_once(table, refused)
+    return *time, force, position
+
+
+def _at_once(table: Table, refused: Sequence[TraceError]) -> TraceError:
+    """Errors about several columns as one; what does not fit into ``MOST_LETTERS`` is left for the next try."""
+    said = str(refused[0])
+    for error in refused[1:]:
+        known = re.split("; (?:and )?", said)
+        more = [text for text in str(error).removeprefix(f"{table.source}: ").split("; ") if text not in known]
+        both = f"{said}; and {'; '.join(more)}"
+        if more and str(error) != str(refused[0]) and len(both) <= MOST_LETTERS:
+            said = both
+    return TraceError(said)
 
 
 def _time_column(table: Table, how: Reading) -> tuple[Column, list[str]]:

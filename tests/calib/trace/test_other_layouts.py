@@ -297,3 +297,25 @@ def test_a_check_names_the_columns_that_are_not_used(tmp_path: Path) -> None:
     path.write_text("\n".join(["time_s,force_N,Prüfweg [mm]", *(",".join(row) for row in rows())]), encoding="utf-8")
     (said,) = [line for line in Calibration("banana", path).check().splitlines() if "not used" in line]
     assert said.startswith("note: cut.csv: not used: Prüfweg [mm] (a length; position_col takes it")
+
+
+@pytest.mark.parametrize(
+    ("how", "missing"),
+    [
+        ({"time_col": "zeit", "force_col": "kraft", "position_col": "weg"}, ["zeit", "kraft", "weg"]),
+        ({"time_col": "zeit", "force_col": "kraft", "depth_col": "weg"}, ["zeit", "kraft", "weg"]),
+        ({"force_col": "kraft", "position_col": "weg"}, ["kraft", "weg"]),
+        ({"time_col": "zeit", "position_col": "weg"}, ["zeit", "weg"]),
+        ({"position_col": "weg"}, ["weg"]),
+    ],
+)
+def test_all_columns_that_are_missing_are_named_at_once(
+    tmp_path: Path, how: dict[str, str], missing: list[str]
+) -> None:
+    """One error for time, force and place, which says once what columns there are."""
+    with pytest.raises(TraceError) as caught:
+        read(tmp_path, text_of("time_s,force_N", [row[:2] for row in rows()]), **how)
+    options = {name: option for option, name in how.items()}
+    said = [f"no column '{name}' (--{options[name].replace('_', '-')})" for name in missing]
+    said[0] += "; the columns are time_s, force_N"
+    assert str(caught.value) == f"cut.csv: {'; and '.join(said)}"
