@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from calib.api import LIMITS, Calibration, script_hidden, workers_for
-from calib.arguments import check_flag, listeners
+from calib.api import Calibration, script_hidden, workers_for
+from calib.arguments import FLAG, LIMITS, check_kind, listeners
 from calib.calibration.parameter_table import ParameterTable, parameter_table
 from calib.calibration.run_folder import RunFolder
 from calib.io.folder import finite
@@ -153,7 +153,7 @@ class Study:
         folder = Path((self.folder or f"cutcal-{self.spec.food.name}") if out is None else out)
         with speaking_of_arguments(), script_hidden(), ExitStack() as shown:
             told = listeners("Study.run", progress, say, shown)
-            check_flag("Study.run", "resume", resume)
+            check_kind("Study.run", "resume", resume, *FLAG)
             say = in_arguments(say)
             device = self._device(workers, budget, arch)
             study = self.spec.run_with(budget=budget, arch=device, command=(f"{self.call}.run({call})",))

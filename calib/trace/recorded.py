@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import TypeVar
 
 import numpy as np
@@ -62,8 +63,9 @@ class Reading:
     decimal: str | None = None
 
     def __post_init__(self) -> None:
-        if self.rate is not None and not (np.isfinite(self.rate) and self.rate > 0.0):
-            raise TraceError(f"rate {self.rate!r} is not positive; give the rows a second (option --rate)")
+        plain = isinstance(self.rate, Real) and not isinstance(self.rate, bool)
+        if self.rate is not None and not (plain and np.isfinite(self.rate) and self.rate > 0.0):
+            raise TraceError(f"rate {quoted(self.rate)} is not positive; give the rows a second (option --rate)")
         if self.decimal not in (None, ".", ","):
             raise TraceError(f"decimal mark {quoted(self.decimal)} is neither . nor , (option --decimal)")
 
