@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from calib.api import Calibration, script_hidden, workers_for
 from calib.arguments import FLAG, LIMITS, check_kind, listeners
-from calib.calibration.parameter_table import ParameterTable, parameter_table
 from calib.calibration.run_folder import RunFolder
 from calib.io.folder import finite
 from calib.io.progress import Progress
 from calib.io.typed_document import to_document
+from calib.io.wide_table import WideTable, table_of_rows
 from calib.io.wording import brief, in_arguments, speaking_of_arguments
 from mpm.runtime import ARCHES
 from mpm.scene.errors import CutcalError, check_number
@@ -53,10 +53,10 @@ class StudyRun(RunFolder):
         return dict(finite(to_document(self.result)))
 
     @property
-    def parameters(self) -> ParameterTable:
+    def parameters(self) -> WideTable:
         """Fitted values by name: value, unit, 95 % interval, literature range, verdict; one of a specimen's own is
         NAME@CUT."""
-        return parameter_table(self.summary["parameters"])
+        return table_of_rows(self.summary["parameters"])
 
 
 @dataclass(frozen=True, eq=False)

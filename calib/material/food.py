@@ -41,8 +41,7 @@ from mpm.scene.profiles import BARRELS, FAMILY
 from mpm.scene.shapes import SHAPE_KINDS
 
 if TYPE_CHECKING:
-    import pandas
-
+    from calib.io.wide_table import WideTable
     from mpm.scene import Food
 
 __all__ = ["FoodSpec", "Property", "Source", "check_override", "load_food", "load_foods", "load_material_file"]
@@ -122,13 +121,13 @@ class FoodSpec:
         """Names of the foods in ``materials.yaml``."""
         return tuple(load_foods())
 
-    def frame(self) -> pandas.DataFrame:
-        """The properties, a row each: ``value``, ``low``, ``high`` (95 % range), ``unit`` and ``status``."""
-        import pandas
+    def frame(self) -> WideTable:
+        """The properties, a row each: ``value``, ``low``, ``high`` (95 % range), ``unit``, ``status``, ``source``."""
+        from calib.io.wide_table import table_of_rows
 
         rows = {name: vars(p) for name, p in self.properties.items()}
-        kept = ["value", "low", "high", "unit", "status"]
-        return pandas.DataFrame.from_dict(rows, orient="index")[kept].rename_axis("property")
+        kept = ["value", "low", "high", "unit", "status", "source"]
+        return table_of_rows(rows)[kept].rename_axis("property")
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the literature's range of each property over its value, but for 0, on axes of matplotlib or new ones."""

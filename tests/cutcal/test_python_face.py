@@ -66,6 +66,21 @@ def test_a_narrow_terminal_shows_every_column(
     assert repr(table[["value", "unit"]]).splitlines()[0].split() == ["value", "unit"]
 
 
+def test_curves_simulations_and_foods_show_every_column(
+    result: CalibrationResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a narrow terminal all names stand in the text; of many rows, the first and the last."""
+    monkeypatch.setenv("COLUMNS", "40")
+    food = Food.load("banana").frame()
+    for table in (result.curves, result.evaluations, food):
+        text = repr(table)
+        assert set(table.columns) <= set(text.split()) and "\\\n" in text  # which ends a part of a wide table
+    assert len(result.curves) > 60 and len(repr(result.curves).splitlines()) < 100
+    assert f"[{len(result.curves)} rows x {len(result.curves.columns)} columns]" in repr(result.curves)
+    source = Food.load("banana").properties["E"].source
+    assert food.loc["E", "source"] == source and source in repr(food)
+
+
 def test_every_option_is_an_argument_of_the_same_name() -> None:
     """None is missing on either side."""
     parser = argparse.ArgumentParser()
