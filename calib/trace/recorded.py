@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -63,9 +63,10 @@ class Reading:
     decimal: str | None = None
 
     def __post_init__(self) -> None:
-        plain = isinstance(self.rate, Real) and not isinstance(self.rate, bool)
-        if self.rate is not None and not (plain and np.isfinite(self.rate) and self.rate > 0.0):
-            raise TraceError(f"rate {quoted(self.rate)} is not positive; give the rows a second (option --rate)")
+        rate: Any = self.rate
+        plain = isinstance(rate, Real) and not isinstance(rate, bool)
+        if rate is not None and not (plain and np.isfinite(rate) and rate > 0.0):
+            raise TraceError(f"rate {quoted(rate)} is not positive; give the rows a second (option --rate)")
         if self.decimal not in (None, ".", ","):
             raise TraceError(f"decimal mark {quoted(self.decimal)} is neither . nor , (option --decimal)")
 

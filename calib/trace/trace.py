@@ -177,7 +177,9 @@ class Trace:
         from calib.formats.frame_table import table_of_frame
 
         if not isinstance(frame, pandas.DataFrame):
-            raise TraceError(f"{quoted(frame)} is no record: give the path of a file, or a pandas DataFrame")
+            plain = frame is None or isinstance(frame, (int, float, list, tuple, dict))
+            shown = quoted(frame) if plain else f"a {type(frame).__name__}"
+            raise TraceError(f"{shown} is no record: give the path of a file, or a pandas DataFrame")
         source = source or str(frame.attrs.get("source") or "")
         if DATA_FRAME not in source:
             source = f"{source} ({DATA_FRAME})" if source else DATA_FRAME

@@ -98,6 +98,7 @@ def test_missing_and_empty_files_are_said(content, words, tmp_path, capsys):
         (["--food", "banana", "--fit", "E,yeild_stress"], ["yeild_stress", "yield_stress"]),
         (["--food", "banana", "--material", "nowhere.yaml"], ["nowhere.yaml"]),
         (["--food", "banana", "--workers", "0"], ["--workers"]),
+        (["--food", "banana", "--workers", "0", "--check"], ["--workers", "at least 1"]),
         (["--food", "banana", "--budget", "5"], ["budget of 5", "9 parameters"]),
     ],
 )

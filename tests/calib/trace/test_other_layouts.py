@@ -319,3 +319,29 @@ def test_all_columns_that_are_missing_are_named_at_once(
     said = [f"no column '{name}' (--{options[name].replace('_', '-')})" for name in missing]
     said[0] += "; the columns are time_s, force_N"
     assert str(caught.value) == f"cut.csv: {'; and '.join(said)}"
+
+
+@pytest.mark.parametrize("fault", ["late", "twice", "ticks"])
+def test_a_record_from_its_end_may_have_other_faults(tmp_path: Path, fault: str) -> None:
+    """It is turned round first, and said; then a row that came late, one that is there twice, or a slow clock."""
+    cells = plain_rows(CUT)[::-1]
+    if fault == "late":
+        cells[50], cells[51] = cells[51], cells[50]
+    elif fault == "twice":
+        cells[50] = cells[49]
+    else:
+        cells = [(f"{int(25 * float(row[0])) / 25:.2f}", *row[1:]) for row in cells]
+    trace = read(tmp_path, text_of(HEADER, cells))
+    assert trace.notes[0] == "cut.csv: time falls from row to row; the record was turned round"
+    assert len(trace.notes) == 2
+    is_the_cut(trace)
+
+
+@pytest.mark.parametrize(("word", "there"), [("nan", True), ("", True), ("left out", False)])
+def test_rows_without_a_number_are_told_from_rows_that_are_not_there(tmp_path: Path, word: str, there: bool) -> None:
+    """A gap that is bridged: in the file are rows with nan or nothing in them, or none."""
+    cells = plain_rows(CUT)
+    cells[300:306] = [(row[0], word, row[2]) for row in cells[300:306]] if there else []
+    said = [note for note in condition(read(tmp_path, text_of(HEADER, cells))).warnings if "a line bridges it" in note]
+    what = "rows without a number (empty or nan) were written" if there else "no samples were written"
+    assert len(said) == 1 and f": {what} for " in said[0]
