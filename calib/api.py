@@ -11,10 +11,11 @@ from typing import Any
 
 import pandas as pd
 
+from calib.arguments import FLAG, KINDS, LIMITS, as_number, check_kind, listeners
 from calib.calibration.result import SUMMARY, read_result, read_summary
 from calib.calibration.result import CalibrationResult as CalibrationResult
 from calib.errors import OutputError
-from calib.io.progress import Progress, ProgressBar
+from calib.io.progress import Progress
 from calib.io.wording import as_arguments, brief, in_arguments, speaking_of_arguments
 from calib.material.food import FoodSpec
 from calib.material.scene import MID_LENGTH, Sizing
@@ -27,24 +28,9 @@ from calib.trace.cuts import WHOLE
 from calib.trace.recorded import Reading
 from calib.trace.trace import Trace, read_trace
 from mpm.runtime import ARCHES
-from mpm.scene.errors import CutcalError, check_number
+from mpm.scene.errors import CutcalError
 from mpm.scene.shapes import SHAPE_KINDS
 
-LIMITS: dict[str, tuple[float, float, str]] = {
-    "speed": (0.0, 10.0, "m/s"),
-    "t_end": (0.0, 1e6, "s"),
-    "height": (1e-3, 1.0, "m"),
-    "width": (1e-3, 1.0, "m"),
-    "length": (1e-3, 1.0, "m"),
-    "at": (0.0, 1.0, ""),
-    "dx": (1e-4, 0.02, "m"),
-    "budget": (0.0, 1e6, ""),
-    "gain_sd": (0.0, 1.0, ""),
-    "lag_sd": (0.0, 1.0, "s"),
-    "bandwidth": (1.0, 1e5, "Hz"),
-    "discrepancy": (0.0, 1.0, ""),
-}
-"""Numbers between which a value must lie, and its unit: those of the command line."""
 LOCAL_WORKERS = 2
 """Simulations at a time on this machine, a process each."""
 READING = ("time_col", "force_col", "position_col", "depth_col", "sign", "rate", "decimal")
@@ -58,6 +44,8 @@ RESUME = "run it again with resume=True"
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
     """What to calibrate; :meth:`run` does it. The names are those of the options of ``calibrate``.
+
+    A size, speed, time or part may be text with a unit, such as ``45mm``, ``20 mm/s`` or ``5%``.
 
     Attributes:
         food: Name in ``materials.yaml``, path of a material's YAML file, or a :class:`~calib.material.food.FoodSpec`.
@@ -105,19 +93,19 @@ class Calibration:
     trace: str | Path | Trace | pd.DataFrame
     air: str | Path | Trace | pd.DataFrame | None = None
     knife: str | Path = "kitchen"
-    speed: float | None = None
-    board_z: float | None = None
-    t_end: float | None = None
+    speed: float | str | None = None
+    board_z: float | str | None = None
+    t_end: float | str | None = None
     shape: str | None = None
-    height: float | None = None
-    width: float | None = None
-    length: float | None = None
+    height: float | str | None = None
+    width: float | str | None = None
+    length: float | str | None = None
     at: float = MID_LENGTH
     outline: str | Path | None = None
     scale: str | None = None
     outline_as: str | None = None
     fit: Sequence[str] | None = None
-    dx: float | None = None
+    dx: float | str | None = None
     budget: float = 100
     sample: bool = False
     withdrawal: bool = False
@@ -135,10 +123,10 @@ class Calibration:
     sign: str | int | None = None
     rate: float | None = None
     decimal: str | None = None
-    gain_sd: float | None = None
-    lag_sd: float | None = None
-    bandwidth: float | None = None
-    discrepancy: float | None = None
+    gain_sd: float | str | None = None
+    lag_sd: float | str | None = None
+    bandwidth: float | str | None = None
+    discrepancy: float | str | None = None
     u_num: str | Path | None = None
     start_from: str | Path | None = None
     scheduler: str | None = None
@@ -153,7 +141,7 @@ class Calibration:
             records = self._record(self.trace), None if self.air is None else self._record(self.air)
             object.__setattr__(self, "_food", food.with_values(self.set) if self.set else food)
             object.__setattr__(self, "_records", records)
-            given = Sizing(self.shape, self.height, self.width, self.length, self.at)
+            given = Sizing(self.shape, *(self._number(name) for name in ("height", "width", "length")), self.at)
             file = OutlineFile(self.outline, self.scale, self.outline_as)
             object.__setattr__(self, "_sizing", file.sizing(given))
 
@@ -166,9 +154,11 @@ class Calibration:
         Raises:
             CutcalError: There is one.
         """
-        for name, (low, high, unit) in LIMITS.items():
-            if getattr(self, name) is not None:
-                check_number("Calibration", name, getattr(self, name), low, high, unit)
+        for item in fields(self):
+            if item.name in KINDS and (value := getattr(self, item.name)) is not item.default:
+                check_kind("Calibration", item.name, value, *KINDS[item.name])
+        for name in LIMITS:
+            self._number(name)
         for name, lowest in (("workers", 1), ("seed", 0)):
             value = getattr(self, name)
             if name == "workers" and value is None:
@@ -182,6 +172,8 @@ class Calibration:
                 raise CutcalError(f"Calibration: {name} = {brief(getattr(self, name))} is none of {listed}")
         if isinstance(self.fit, str):
             raise CutcalError(f"Calibration: fit = {brief(self.fit)} is text; give a list of names, such as ['E', 'R']")
+        for name in (*(self.fit or ()), *(self.set or ())):
+            check_kind("Calibration", "a name of a property", name, (str,), "text, such as 'E'")
         if self.baseline not in BASELINES:
             raise CutcalError(f"Calibration: baseline = {brief(self.baseline)} is none of {', '.join(BASELINES)}")
         if not (self.cut is None or self.cut == WHOLE or (type(self.cut) is int and self.cut > 0)):
@@ -199,6 +191,14 @@ class Calibration:
             said = "columns say" if self.columns else f"{next(iter(self._reading))} says"
             raise CutcalError(f"Calibration: {said} how a file is read, but the trace is a Trace, which has been")
 
+    def _number(self, name: str) -> float | None:
+        """A number that was given [SI], also as text with a unit.
+
+        Raises:
+            CutcalError: It is none, or not between its limits.
+        """
+        return as_number("Calibration", name, getattr(self, name))
+
     @property
     def _reading(self) -> dict[str, Any]:
         """How files and DataFrames are read: what differs from the usual."""
@@ -212,26 +212,27 @@ class Calibration:
             out: Output folder, for the command that the summary states.
         """
         trace, air = self._records
+        discrepancy = self._number("discrepancy")
         return Request(
             food=self._food,
             trace=trace,
             air=air,
             knife=str(self.knife),
-            speed=self.speed,
-            board_z=self.board_z,
-            t_end=self.t_end,
+            speed=self._number("speed"),
+            board_z=self._number("board_z"),
+            t_end=self._number("t_end"),
             baseline=self.baseline,
             cut=self.cut,
             sizing=self._sizing,
             fit=None if self.fit is None else tuple(self.fit),
-            dx=self.dx,
+            dx=self._number("dx"),
             budget=self.budget,
             sample=self.sample,
             withdrawal=self.withdrawal,
-            gain_sd=self.gain_sd,
-            lag_sd=self.lag_sd,
-            bandwidth=self.bandwidth,
-            errors=ErrorModel() if self.discrepancy is None else ErrorModel(discrepancy=self.discrepancy),
+            gain_sd=self._number("gain_sd"),
+            lag_sd=self._number("lag_sd"),
+            bandwidth=self._number("bandwidth"),
+            errors=ErrorModel() if discrepancy is None else ErrorModel(discrepancy=discrepancy),
             u_num=None if self.u_num is None else Path(self.u_num),
             start_from=None if self.start_from is None else Path(self.start_from),
             seed=self.seed,
@@ -265,12 +266,12 @@ class Calibration:
 
         request = self.request("" if out is None else out)
         folder = Path(f"cutcal-{request.food.name}-{request.stem}" if out is None else out)
-        say = in_arguments(say)
         with speaking_of_arguments(), script_hidden(), ExitStack() as shown:
+            told = listeners("Calibration.run", progress, say, shown)
+            check_kind("Calibration.run", "resume", resume, *FLAG)
+            say = in_arguments(say)
             pool = shown.enter_context(workers_for(self.workers, self.arch, self.scheduler, say))
-            if isinstance(progress, bool):
-                progress = shown.enter_context(ProgressBar()) if progress else None
-            return run(request, folder, pool, resume=resume, progress=progress, say=say)
+            return run(request, folder, pool, resume=resume, progress=told, say=say)
 
     def check(self, png: str | Path | None = None) -> str:
         """How the trace is read and what would be fitted, as ``calibrate --check`` says it; nothing is simulated.

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from calib.api import LIMITS, Calibration, script_hidden, workers_for
-from calib.calibration.parameter_table import ParameterTable, parameter_table
+from calib.api import Calibration, script_hidden, workers_for
+from calib.arguments import FLAG, LIMITS, check_kind, listeners
 from calib.calibration.run_folder import RunFolder
 from calib.io.folder import finite
-from calib.io.progress import Progress, ProgressBar
+from calib.io.progress import Progress
 from calib.io.typed_document import to_document
+from calib.io.wide_table import WideTable, table_of_rows
 from calib.io.wording import brief, in_arguments, speaking_of_arguments
 from mpm.runtime import ARCHES
 from mpm.scene.errors import CutcalError, check_number
@@ -52,10 +53,10 @@ class StudyRun(RunFolder):
         return dict(finite(to_document(self.result)))
 
     @property
-    def parameters(self) -> ParameterTable:
+    def parameters(self) -> WideTable:
         """Fitted values by name: value, unit, 95 % interval, literature range, verdict; one of a specimen's own is
         NAME@CUT."""
-        return parameter_table(self.summary["parameters"])
+        return table_of_rows(self.summary["parameters"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,14 +151,14 @@ class Study:
             + [f"{name}={value!r}" for name, value in (("budget", budget), ("arch", arch)) if value is not None]
         )
         folder = Path((self.folder or f"cutcal-{self.spec.food.name}") if out is None else out)
-        say = in_arguments(say)
         with speaking_of_arguments(), script_hidden(), ExitStack() as shown:
+            told = listeners("Study.run", progress, say, shown)
+            check_kind("Study.run", "resume", resume, *FLAG)
+            say = in_arguments(say)
             device = self._device(workers, budget, arch)
             study = self.spec.run_with(budget=budget, arch=device, command=(f"{self.call}.run({call})",))
             pool = shown.enter_context(workers_for(workers, device, scheduler, say))
-            if isinstance(progress, bool):
-                progress = shown.enter_context(ProgressBar()) if progress else None
-            result = run(study, folder, pool, resume=resume, progress=progress, say=say)
+            result = run(study, folder, pool, resume=resume, progress=told, say=say)
         return StudyRun(folder, result)
 
     def _device(self, workers: int | None, budget: float | None, arch: str | None) -> str:

@@ -211,7 +211,7 @@ def print_json(document: Any) -> None:
 def add_workers(p: Group, what: str) -> None:
     """Options that say how many at a time, and on which machines."""
     p = titled(p, RUN)
-    p.add_argument("--workers", type=int, metavar="N", help=f"{what} at a time (2); on a Dask --scheduler")
+    p.add_argument("--workers", type=whole(1), metavar="N", help=f"{what} at a time (2); on a Dask --scheduler")
     p.add_argument("--scheduler", metavar="ADDRESS", help=argparse.SUPPRESS)
 
 
@@ -223,10 +223,8 @@ def workers_of(args: argparse.Namespace, say: Callable[[str], None]) -> Workers:
         say: Called with a sentence about the workers of a cluster.
 
     Raises:
-        CutcalError: An impossible number, or a cluster that cannot be used.
+        CutcalError: A cluster that cannot be used.
     """
-    if args.workers is not None and args.workers < 1:
-        raise CutcalError(f"--workers {args.workers}: at least 1")
     if args.scheduler is not None:
         return Cluster(args.scheduler, args.workers, args.arch, say=say)
     return Pool(LOCAL_WORKERS if args.workers is None else args.workers, args.arch)

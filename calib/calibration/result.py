@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 
 from calib.calibration.fit_report import fit_report, html_table
-from calib.calibration.parameter_table import ParameterTable, parameter_table
 from calib.calibration.result_parts import (
     Agreement,
     AirSource,
@@ -35,6 +34,7 @@ from calib.io.folder import finite
 from calib.io.provenance import Invocation, Software
 from calib.io.type_schema import ALWAYS, NotNegative, Shared, keywords, one_of
 from calib.io.typed_document import FLAT, NULL, renamed
+from calib.io.wide_table import WideTable, table_of_rows
 from calib.io.wording import brief
 from calib.material.properties import MEANINGS
 from calib.material.references import cited
@@ -164,12 +164,12 @@ class CalibrationResult(RunFolder):
         return self.agreement.peak_real_sd_N or 0.0, gain, sd.get("drift", 0.0)
 
     @property
-    def parameters(self) -> ParameterTable:
+    def parameters(self) -> WideTable:
         """Fitted values by name: value, unit, 95 % interval, literature range, verdict, status, source."""
-        return parameter_table(self.summary["parameters"])
+        return table_of_rows(self.summary["parameters"])
 
     @property
-    def curves(self) -> pd.DataFrame:
+    def curves(self) -> WideTable:
         """Trace, simulation, its parts and the null models over the stroke [m, N].
 
         Raises:
@@ -178,7 +178,7 @@ class CalibrationResult(RunFolder):
         return _table(self.folder / CURVES)
 
     @property
-    def withdrawal_curves(self) -> pd.DataFrame:
+    def withdrawal_curves(self) -> WideTable:
         """Measured and simulated pull over the way up, with the 95 % band [m, N].
 
         Raises:
@@ -189,13 +189,13 @@ class CalibrationResult(RunFolder):
         return _table(self.folder / WITHDRAWAL_CURVES)
 
     @property
-    def evaluations(self) -> pd.DataFrame:
+    def evaluations(self) -> WideTable:
         """All simulations of the search, a row each: outcome, grid, part of the stroke, time [s], parameters [SI].
 
         Raises:
             OutputError: evaluations.h5 is missing or damaged.
         """
-        return evaluation_frame(self.folder)
+        return WideTable(evaluation_frame(self.folder))
 
     @property
     def modes(self) -> tuple[ModeSummary, ...]:
@@ -355,14 +355,14 @@ def read_summary(path: Path, remedy: str = REMEDY) -> Any:
         raise DocumentError(f"{path}: damaged, not JSON ({brief(str(e))}); {remedy}") from None
 
 
-def _table(path: Path) -> pd.DataFrame:
+def _table(path: Path) -> WideTable:
     """A table of curves.
 
     Raises:
         OutputError: It is missing or damaged.
     """
     try:
-        return pd.read_csv(path)
+        return WideTable(pd.read_csv(path))
     except (OSError, ValueError) as error:
         raise OutputError(
             f"{path}: cannot be read ({brief(str(error))}); run the calibration with resume=True"

@@ -15,7 +15,7 @@ from calib.io.type_schema import Count, Fraction, NotNegative, Positive, Shared,
 from calib.io.typed_document import FLAT, NULL
 
 if TYPE_CHECKING:
-    import pandas
+    from calib.io.wide_table import WideTable
 
 ALL = "all"
 """What is to be narrowed, where that is every parameter."""
@@ -155,11 +155,11 @@ class DesignResult:
         return next((t.name for t in self.tests if t.helps), None)
 
     @property
-    def ranking(self) -> pandas.DataFrame:
+    def ranking(self) -> WideTable:
         """The tests by name, the one that narrows most first: minutes [min], bits [bit], what it narrows, expected ends
         of the 95 % interval [unit], its width over the present one [-], the command that takes the record, and what is
         done."""
-        import pandas
+        from calib.io.wide_table import table_of_rows  # it takes long to import
 
         rows = {}
         for test in self.tests:
@@ -174,7 +174,7 @@ class DesignResult:
                 "record": test.taken_by,
                 "what": test.what,
             }
-        return pandas.DataFrame.from_dict(rows, orient="index")
+        return table_of_rows(rows)
 
     def plot(self) -> Any:
         """Draw what each test leaves of the present intervals; the figure of ``design.svg``.

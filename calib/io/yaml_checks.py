@@ -258,14 +258,14 @@ def check_keys(
         place: Where the mapping is, for errors.
         given: The mapping.
         required: Keys that it must have.
-        optional: Keys that it may have.
+        optional: Keys that it may have; required ones may be among them.
         synonyms: As in :func:`suggest`.
 
     Raises:
         CutcalError: An unknown key (with the nearest known one) or the missing keys.
     """
     required = list(required)
-    known = [*required, *optional]
+    known = list(dict.fromkeys([*required, *optional]))
     for key in given:
         if key not in known:
             raise place.at(key).error(f"unknown key{suggest(key, known, synonyms)}")

@@ -41,8 +41,7 @@ from mpm.scene.profiles import BARRELS, FAMILY
 from mpm.scene.shapes import SHAPE_KINDS
 
 if TYPE_CHECKING:
-    import pandas
-
+    from calib.io.wide_table import WideTable
     from mpm.scene import Food
 
 __all__ = ["FoodSpec", "Property", "Source", "check_override", "load_food", "load_foods", "load_material_file"]
@@ -122,13 +121,13 @@ class FoodSpec:
         """Names of the foods in ``materials.yaml``."""
         return tuple(load_foods())
 
-    def frame(self) -> pandas.DataFrame:
-        """The properties, a row each: ``value``, ``low``, ``high`` (95 % range), ``unit`` and ``status``."""
-        import pandas
+    def frame(self) -> WideTable:
+        """The properties, a row each: ``value``, ``low``, ``high`` (95 % range), ``unit``, ``status``, ``source``."""
+        from calib.io.wide_table import table_of_rows
 
         rows = {name: vars(p) for name, p in self.properties.items()}
-        kept = ["value", "low", "high", "unit", "status"]
-        return pandas.DataFrame.from_dict(rows, orient="index")[kept].rename_axis("property")
+        kept = ["value", "low", "high", "unit", "status", "source"]
+        return table_of_rows(rows)[kept].rename_axis("property")
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the literature's range of each property over its value, but for 0, on axes of matplotlib or new ones."""
@@ -372,14 +371,14 @@ def load_material_file(path: Path | str) -> FoodSpec:
 def _read_food(place: Place, raw: Any, own: bool = False) -> FoodSpec:
     """A food as a file has it; what a file of one's own leaves out has a default."""
     food = mapping(place, raw)
-    check_keys(place, food, ("shape", "properties"), ("not_modelled", *INCLUSIONS))
+    check_keys(place, food, ("shape",) if own else ("shape", "properties"), ("properties", "not_modelled", *INCLUSIONS))
     said = text(place.at("not_modelled"), food["not_modelled"]) if "not_modelled" in food else None
     shape = mapping(place.at("shape"), food["shape"])
-    given = mapping(place.at("properties"), food["properties"])
+    none = own and food.get("properties") is None
+    given = {} if none else mapping(place.at("properties"), food["properties"])
     check_keys(place.at("shape"), shape, ("kind", *DIMENSIONS), tuple(FORM), SYNONYMS)
     needed = [] if own else [n for n in PROPERTIES if n not in _OPTIONAL]
-    optional = [n for n in PROPERTIES if n not in needed]
-    check_keys(place.at("properties"), given, needed, optional, SYNONYMS)
+    check_keys(place.at("properties"), given, needed, PROPERTIES, SYNONYMS)
     dims = {n: read_property(place.at("shape"), n, shape[n]) for n in DIMENSIONS}
     form = {n: read_property(place.at("shape"), n, shape[n]) for n in FORM if n in shape}
     held = {n: _read_sizes(place.at(n), food[n]) for n in INCLUSIONS if n in food}

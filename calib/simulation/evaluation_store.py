@@ -178,12 +178,12 @@ class EvaluationStore:
         self._entries[key] = entry
 
     def close(self) -> None:
-        """Write the HDF5 file and remove the journal.
+        """Write the HDF5 file and remove the journal. A store without a run leaves no file.
 
         Raises:
             OutputError: The file cannot be written; the journal then still holds everything.
         """
-        if self._stream is not None or not self.path.exists():
+        if self._stream is not None or (self._entries and not self.path.exists()):
             self._compact()
 
     def _begin(self) -> BinaryIO:

@@ -128,17 +128,19 @@ def _check_swapped(table: Table, time: Column, force: Column, t: np.ndarray, f: 
 def _in_order(table: Table, time: Column, columns: tuple[np.ndarray, ...]) -> tuple[np.ndarray, list[str]]:
     """The samples in the order of their times, and what was done, one sentence each.
 
-    A file that begins with the last sample is turned round. Rows that say again what an earlier row says are left out.
-    A few rows that came late, as over a network, are put where they belong. A lone time that is far from both of its
-    neighbours is left out.
+    A file that begins with the last sample is turned round before anything else. Rows that say again what an earlier
+    row says are left out. A few rows that came late, as over a network, are put where they belong. A lone time that is
+    far from both of its neighbours is left out.
     """
     t = columns[0]
     order, notes = np.arange(len(t)), []
     steps = np.diff(t)
     if len(t) < FEWEST_ROWS or len(table.parts) > 1 or np.all(steps > 0.0):
         return order, []
-    if np.all(steps < 0.0):
-        return order[::-1], [f"{table.source}: time falls from row to row; the record was turned round"]
+    if np.any(steps < 0.0) and np.count_nonzero(steps > 0.0) <= MOST_UNORDERED * np.count_nonzero(steps):
+        turned = replace(table, rows=[table.rows[i] for i in order[::-1]])
+        kept, more = _in_order(turned, time, tuple(numbers[::-1] for numbers in columns))
+        return order[::-1][kept], [f"{table.source}: time falls from row to row; the record was turned round", *more]
     falls = np.flatnonzero(steps < 0.0)
     if not len(falls) or len(falls) > MOST_UNORDERED * len(t):
         return order, []

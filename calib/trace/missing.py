@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 
@@ -118,7 +119,7 @@ def _gaps(trace: Trace) -> list[_Gap]:
     """Where the clock goes on by many samples, or the knife without it, as where times were counted from the rows."""
     steps = np.diff(trace.time)
     late = steps > JUMP * float(np.median(steps))
-    found = {int(i): "no samples were written" for i in np.flatnonzero(late)}
+    found = {int(i): _not_there(trace, int(i), steps) for i in np.flatnonzero(late)}
     if trace.position is not None:
         moves = np.abs(np.diff(trace.position))
         usual = float(np.median(moves[moves > 0.0])) if np.any(moves > 0.0) else 0.0
@@ -126,6 +127,16 @@ def _gaps(trace: Trace) -> list[_Gap]:
         jumps = np.flatnonzero((moves > max(JUMP * usual, SHORTEST_JUMP_M)) & ~late)
         found |= {int(i): "the position jumps from one sample to the next, others are missing" for i in jumps}
     return [_Gap(i, i + 1, why) for i, why in sorted(found.items()) if i + 1 not in trace.breaks]
+
+
+def _not_there(trace: Trace, i: int, steps: np.ndarray) -> str:
+    """What is in place of samples after one of them, by the numbers of the rows: rows without a number, or none."""
+    names = trace.rows[i : i + 2] if trace.rows else ()
+    if len(names) == 2 and all(isinstance(name, Integral) for name in names):
+        missing = round(float(steps[i]) / float(np.median(steps))) - 1
+        if int(names[1]) - int(names[0]) - 1 >= missing:
+            return "rows without a number (empty or nan) were written"
+    return "no samples were written"
 
 
 def _stands(trace: Trace, place: Standing, what: str) -> str:

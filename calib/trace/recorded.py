@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
+from typing import Any, TypeVar
 
 import numpy as np
 
 from calib.errors import TraceError
-from calib.io.wording import LONG, brief, quoted
+from calib.io.wording import LONG, brief, listed, quoted
 from calib.table.table import Table, rows_at
 from calib.trace.clock import running_clock
 from calib.trace.columns import Column, candidates, choose, is_sparse, numbers, without_empty
-from calib.trace.names import COUNTERS, stem_of
+from calib.trace.names import COUNTERS, meaning, named_like, not_measured, stem_of
 
+Chosen = TypeVar("Chosen")
 MIN_SAMPLES = 20
 """Fewest samples of a trace: below this, baseline, onset and ramp have under seven samples each."""
 CLOCK_START_S = 1000.0
@@ -25,6 +29,8 @@ MOST_LETTERS = 450
 """Of an error that says two things at once; a longer one says the first alone."""
 ROWS = "the rows"
 """What the time is called where rows are counted."""
+MOST_UNUSED = 5
+"""Names that a note on unused columns shows of those that nothing is said of."""
 RISING = 0.1
 """Part of a position's range by which it rises with the force if it is no height."""
 TURNED = 0.2
@@ -57,8 +63,10 @@ class Reading:
     decimal: str | None = None
 
     def __post_init__(self) -> None:
-        if self.rate is not None and not (np.isfinite(self.rate) and self.rate > 0.0):
-            raise TraceError(f"rate {self.rate!r} is not positive; give the rows a second (option --rate)")
+        rate: Any = self.rate
+        plain = isinstance(rate, Real) and not isinstance(rate, bool)
+        if rate is not None and not (plain and np.isfinite(rate) and rate > 0.0):
+            raise TraceError(f"rate {quoted(rate)} is not positive; give the rows a second (option --rate)")
         if self.decimal not in (None, ".", ","):
             raise TraceError(f"decimal mark {quoted(self.decimal)} is neither . nor , (option --decimal)")
 
@@ -103,8 +111,7 @@ def recorded(table: Table, how: Reading) -> Recorded:
     Raises:
         TraceError: A column or a cell cannot be used; the message names file, column and row.
     """
-    time, said, force = _time_and_force(table, how)
-    position = _position_column(table, how)
+    time, said, force, position = _chosen(table, how)
     if how.sign is not None:
         force = replace(force, factor=abs(force.factor) * parse_sign(how.sign))
     table = without_empty(table, [column for column in (time, force, position) if column is not None])
@@ -123,6 +130,7 @@ def recorded(table: Table, how: Reading) -> Recorded:
     start = float(clock.time[0]) if abs(clock.time[0]) > CLOCK_START_S else 0.0
     used = {"time": time, "force": force} | ({} if position is None else {"position": position})
     notes = (*table.notes, *said, *(note for column in used.values() for note in column.notes), *sparse)
+    notes += _unused(table, [column.name for column in used.values()], how, notes)
     return Recorded(
         time=clock.time - start,
         force=f,
@@ -148,26 +156,39 @@ def parse_sign(sign: str | int) -> float:
     return signs[str(sign)]
 
 
-def _time_and_force(table: Table, how: Reading) -> tuple[Column, list[str], Column]:
-    """The columns of the time and of the force, and what was said of the time.
+def _chosen(table: Table, how: Reading) -> tuple[Column, list[str], Column, Column | None]:
+    """The columns of the time, of the force and of the knife's place, and what was said of the time.
 
     Raises:
-        TraceError: One cannot be used, or both: it is then said of both at once.
+        TraceError: One of them cannot be used, or several: it is then said of all at once, as far as it is short.
     """
-    try:
-        time, said = _time_column(table, how)
-    except TraceError as missing:
+    refused: list[TraceError] = []
+
+    def tried(choice: Callable[[], Chosen]) -> Chosen | None:
         try:
-            choose(table, "force", how.force_col)
-        except TraceError as also:
-            first = str(missing).split("; ")
-            other = str(also).removeprefix(f"{table.source}: ")
-            more = [text for text in other.split("; ") if text not in first]
-            both = f"{missing}; and {'; '.join(more)}"
-            if more and str(also) != str(missing) and len(both) <= MOST_LETTERS:
-                raise TraceError(both) from None
-        raise
-    return time, said, choose(table, "force", how.force_col)
+            return choice()
+        except TraceError as error:
+            refused.append(error)
+            return None
+
+    time = tried(lambda: _time_column(table, how))
+    force = tried(lambda: choose(table, "force", how.force_col))
+    position = tried(lambda: _position_column(table, how))
+    if refused or time is None or force is None:
+        raise _at_once(table, refused)
+    return *time, force, position
+
+
+def _at_once(table: Table, refused: Sequence[TraceError]) -> TraceError:
+    """Errors about several columns as one; what does not fit into ``MOST_LETTERS`` is left for the next try."""
+    said = str(refused[0])
+    for error in refused[1:]:
+        known = re.split("; (?:and )?", said)
+        more = [text for text in str(error).removeprefix(f"{table.source}: ").split("; ") if text not in known]
+        both = f"{said}; and {'; '.join(more)}"
+        if more and str(error) != str(refused[0]) and len(both) <= MOST_LETTERS:
+            said = both
+    return TraceError(said)
 
 
 def _time_column(table: Table, how: Reading) -> tuple[Column, list[str]]:
@@ -223,6 +244,45 @@ def _position_column(table: Table, how: Reading) -> Column | None:
     if how.position_col == DISABLED or (how.position_col is None and not candidates(table, "position")):
         return None
     return choose(table, "position", how.position_col)
+
+
+def _unused(table: Table, used: Sequence[str], how: Reading, said: Sequence[str]) -> tuple[str, ...]:
+    """A sentence on the columns that are not read, with what could be the knife's place first, or nothing.
+
+    Args:
+        table: The table.
+        used: Names of the columns that are read.
+        how: How the record is read.
+        said: What was said before: a column that it names is not named again. Numbers of rows are not named at all.
+
+    Returns:
+        The sentence, or nothing where all columns are read.
+    """
+    words = [note.removeprefix(f"{table.source}: ") for note in said]
+    names = [
+        name
+        for name in table.columns
+        if name not in used
+        and not any(re.search(rf"(?<!\w){re.escape(brief(name, LONG))}(?!\w)", text) for text in words)
+        and not (stem_of(name) in {*COUNTERS, "", "unnamed_0"} and _counts(table, name))
+    ]
+    asked = how.position_col is None and how.depth_col is None
+    free = [name for name in names if not not_measured(name)] if asked and len(used) < 3 else []
+    lengths = [name for name in free if (unit := meaning(table, name).measure) and unit.fits("position")]
+    bare = [name for name in free if not meaning(table, name).unit and named_like(stem_of(name), "position")]
+    parts = []
+    if lengths:
+        what = ("a length", "it") if len(lengths) == 1 else ("lengths", "one")
+        hint = f"{what[0]}; --position-col takes {what[1]} as the knife's height, --depth-col as its depth"
+        parts.append(f"{listed(lengths, LONG)} ({hint})")
+    if bare:
+        hint = f"no unit; if it is the knife's place: --position-col {quoted(f'{brief(bare[0])}=mm')}"
+        parts.append(f"{listed(bare, LONG)} ({hint})")
+    others = [name for name in names if name not in (*lengths, *bare)]
+    if others:
+        more = len(others) - MOST_UNUSED
+        parts.append(listed(others[:MOST_UNUSED], LONG) + (f" and {more} more columns" if more > 0 else ""))
+    return (f"{table.source}: not used: {', '.join(parts)}",) if parts else ()
 
 
 def _on_the_forces_rows(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from calib.errors import TraceError
 from calib.formats.reader import read_table
 from calib.io.wording import brief, quoted, speaking_of_arguments
+from calib.io.yaml_checks import suggest
 from calib.table.table import MEASURED, TRACE_LABELS, Table, rows_at
 from calib.trace.recorded import MIN_SAMPLES as MIN_SAMPLES
 from calib.trace.recorded import Reading, recorded
@@ -176,12 +177,14 @@ class Trace:
         from calib.formats.frame_table import table_of_frame
 
         if not isinstance(frame, pandas.DataFrame):
-            raise TraceError(f"a {type(frame).__name__} is no record: give the path of a file, or a pandas DataFrame")
+            plain = frame is None or isinstance(frame, (int, float, list, tuple, dict))
+            shown = quoted(frame) if plain else f"a {type(frame).__name__}"
+            raise TraceError(f"{shown} is no record: give the path of a file, or a pandas DataFrame")
         source = source or str(frame.attrs.get("source") or "")
         if DATA_FRAME not in source:
             source = f"{source} ({DATA_FRAME})" if source else DATA_FRAME
         label = label or str(frame.attrs.get("label") or MEASURED)
-        return _trace(table_of_frame(frame, source=source, label=label), Reading(**how))
+        return _trace(table_of_frame(frame, source=source, label=label), _reading(how))
 
     def frame(self) -> pandas.DataFrame:
         """The trace as a pandas DataFrame: ``time_s``, ``force_N`` and, where it has one, ``position_m``.
@@ -238,8 +241,21 @@ def read_trace(path: str | Path | pandas.DataFrame, **how: Any) -> Trace:
     """
     if not isinstance(path, (str, Path)):
         return Trace.from_frame(path, **how)
-    reading = Reading(**how)
+    reading = _reading(how)
     return _trace(read_table(path, reading.decimal), reading)
+
+
+def _reading(how: Mapping[str, Any]) -> Reading:
+    """How a record is to be read, by names of arguments.
+
+    Raises:
+        TraceError: There is no such argument.
+    """
+    names = [item.name for item in fields(Reading)]
+    unknown = next((name for name in how if name not in names), None)
+    if unknown is not None:
+        raise TraceError(f"argument {quoted(unknown)} is not known{suggest(unknown, names)}")
+    return Reading(**how)
 
 
 def _trace(table: Table, how: Reading) -> Trace:

@@ -300,12 +300,15 @@ def _holds(interval: Interval, values: Mapping[str, float]) -> bool:
 def _without_claims(
     analysis: UncertaintyAnalysis, why: str, lost: Callable[[Interval], bool] = lambda i: True
 ) -> UncertaintyAnalysis:
-    """The same with those that are ``lost`` weak where they were identified, and with a sentence on why."""
+    """The same with those that are ``lost`` weak where they were identified, and with a sentence on why.
+
+    The sentence does not call them weak: one that is known only as a product is called that in the end.
+    """
     gone = [i for i in analysis.uncertainty.intervals if i.verdict == "identified" and lost(i)]
     if not gone:
         return analysis
     changed = tuple(replace(i, verdict="weak") if i in gone else i for i in analysis.uncertainty.intervals)
-    remark = f"{_names(gone)}: {why}, so called weak."
+    remark = f"{_names(gone)}: {why}, so not called identified."
     uncertainty = replace(analysis.uncertainty, intervals=changed)
     return replace(analysis, uncertainty=uncertainty, remarks=(*analysis.remarks, remark))
 

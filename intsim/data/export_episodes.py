@@ -124,6 +124,7 @@ def _each(
     """Those trajectories whose numbers are kept."""
     total = len(kept) * max(len(backgrounds), 1)
     rest, done = Countdown(total), 0
+    what = "trajectory before a background" if len(backgrounds) > 1 else "trajectory"
     for turn, background in enumerate(backgrounds or [None]):
         for k, stored in enumerate(trajectories(folder)):
             if k not in kept:
@@ -132,4 +133,4 @@ def _each(
             pictures = {} if background is None else load_pictures(folder, stored, background, pixels, cameras)
             yield ExportEpisode(stored, background, sentences[(k + turn) % len(sentences)], pictures)
             done += 1
-            say(f"episode {done} of {total}, {rest.left(1)}")
+            say(f"{what} {done} of {total}, {rest.left(1)}")

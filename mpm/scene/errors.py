@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import reprlib
 
 
 class CutcalError(Exception):
@@ -55,7 +56,8 @@ def check_number(where: str, name: str, value: float, low: float, high: float, u
     Raises:
         SceneError: It is no finite number, or not between the limits.
     """
-    ok = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    if not ok or not low < value < high:
+    plain = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not plain or not math.isfinite(value) or not low < value < high:
         limits = f"from 0 to less than {high:g}" if -HAIR < low < 0.0 else f"between {low:g} and {high:g}"
-        raise SceneError(f"{where}: {name} = {value!r} {unit} must be a number {limits} {unit}")
+        shown = f"{value!r} {unit}".rstrip() if plain else reprlib.repr(value)
+        raise SceneError(f"{where}: {name} = {shown} must be a number {limits} {unit}".rstrip())

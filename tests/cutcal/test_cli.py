@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,8 @@ import pytest
 
 from calib.calibration.result import read_result
 from calib.material.food import load_food, load_foods
+from calib.material.references import remarks
+from calib.validation.bounds import TOLD
 from cutcal.commands.calibration.calibrate import verdict_text
 from cutcal.main import main
 from tests.data_dir import ROOT
@@ -95,6 +98,7 @@ def test_missing_and_empty_files_are_said(content, words, tmp_path, capsys):
         (["--food", "banana", "--fit", "E,yeild_stress"], ["yeild_stress", "yield_stress"]),
         (["--food", "banana", "--material", "nowhere.yaml"], ["nowhere.yaml"]),
         (["--food", "banana", "--workers", "0"], ["--workers"]),
+        (["--food", "banana", "--workers", "0", "--check"], ["--workers", "at least 1"]),
         (["--food", "banana", "--budget", "5"], ["budget of 5", "9 parameters"]),
     ],
 )
@@ -145,6 +149,30 @@ def test_foods_lists_and_shows(capsys):
     assert "! cherry: not modelled: the stone" in capsys.readouterr().out
     assert main(["foods", "banana", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["banana"]["properties"]["E"]["value"] == load_food("banana").value("E")
+
+
+@pytest.mark.parametrize("food", ["banana", "apple", "grape"])
+def test_a_food_is_shown_with_the_remarks_that_it_cites(food, capsys):
+    """Each once, in short lines, and no other."""
+    assert main(["foods", food]) == 0
+    shown = capsys.readouterr().out
+    cited = set(re.findall(r"\(remark (\d+)\)", shown))
+    assert cited and re.findall(r"^  remark (\d+): ", shown, re.MULTILINE) == sorted(cited, key=int)
+    plain = " ".join(shown.split())
+    assert all(remarks()[number] in plain for number in cited)
+    assert max(map(len, shown.partition("  remark ")[2].splitlines())) <= 100
+
+
+def test_the_terminal_says_verdicts_in_words(tmp_path):
+    """Those of the glossary; documents and tables keep their identifiers."""
+    result = read_result(write_run(tmp_path))
+    codes = {p.verdict for p in result.fitted.values()}
+    assert {"one_sided", "only_as_product"} <= codes
+    for text in (verdict_text(result), result.fit_report(), result._repr_html_()):
+        assert "one-sided" in text and "only as a product" in text and "_sided" not in text and "as_product" not in text
+    assert set(result.parameters["verdict"]) == codes
+    glossary = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    assert [words for words in TOLD.values() if f"| {words} |" not in glossary] == ["not determined"]
 
 
 def test_the_terminal_has_units_that_people_use(tmp_path):

@@ -78,8 +78,8 @@ def test_the_documented_script_runs(folder: Path) -> None:
 @pytest.mark.slow
 def test_results_load_back(folder: Path) -> None:
     """A finished folder gives summary, tables, food and report, and says how it was made."""
-    result = Calibration.load(folder / "runs" / "banana")
-    summary = json.loads((folder / "runs" / "banana" / "summary.json").read_text())
+    result = Calibration.load(folder / "runs" / "python")
+    summary = json.loads((folder / "runs" / "python" / "summary.json").read_text())
     assert result.summary == summary and result.passed is summary["passed"]
     assert list(result.parameters.index) == ["E", "R"]
     assert result.parameters.loc["R", "value"] == summary["parameters"]["R"]["value"]
@@ -89,7 +89,7 @@ def test_results_load_back(folder: Path) -> None:
     )
     assert result.report.read_bytes().startswith(b"%PDF")
     assert summary["trace"]["source"] == "banana_reconstructed.csv"
-    call = "Calibration('banana', trace=Trace('banana_reconstructed.csv'), height=0.033).run('runs/banana')"
+    call = "Calibration('banana', trace=Trace('banana_reconstructed.csv'), height=0.033).run('runs/python')"
     assert summary["command"] == [call]
     assert len(repr(result)) < 200
 
@@ -174,11 +174,23 @@ def test_groups_of_a_file_are_named_whole() -> None:
         ({"food": "bananna"}, "did you mean 'banana'"),
         ({"food": "nowhere.yaml"}, "nowhere.yaml: no such file"),
         ({"trace": "nowhere.csv"}, "nowhere.csv: no such file"),
-        ({"trace": 3}, "a int is no record"),
+        ({"trace": 3}, "3 is no record: give the path"),
+        ({"trace": None}, "None is no record: give the path"),
+        ({"food": 3}, "food = 3; give a name, a YAML file or a Food"),
+        ({"set": ["E=2"]}, "set = ['E=2']; give a dict such as {'E': 2e5}"),
+        ({"set": {3: 1.0}}, "a name of a property = 3; give text"),
+        ({"start_from": ["x"]}, "start_from = ['x']; give the path of a folder"),
+        ({"sample": "yes"}, "sample = 'yes'; give True or False"),
+        ({"rate": "fast"}, "rate = 'fast'; give the rows a second"),
+        ({"fit": 5}, "fit = 5; give a list of names"),
+        ({"fit": [1]}, "a name of a property = 1; give text"),
         ({"height": -1.0}, "height = -1.0 m must be a number between 0.001 and 1 m"),
-        ({"height": "33 mm"}, "height = '33 mm' m must be a number"),
+        ({"height": "33 kg"}, "height: '33 kg' is not a length: write it in m, or with its unit"),
+        ({"height": "3300 mm"}, "height = 3.3 m must be a number between 0.001 and 1 m"),
+        ({"height": [0.03]}, "height = [0.03] must be a number between 0.001 and 1 m"),
         ({"speed": float("nan")}, "speed = nan m/s must be"),
-        ({"budget": 0}, "budget = 0"),
+        ({"budget": -3}, "budget = -3 must be a number between 0 and 1e+06"),
+        ({"budget": "100"}, "budget = '100' must be a number between 0 and 1e+06"),
         ({"workers": 0}, "workers = 0; give a whole number of at least 1"),
         ({"seed": 1.5}, "seed = 1.5; give a whole number"),
         ({"shape": "banana"}, "shape = banana is none of block"),
@@ -193,7 +205,32 @@ def test_impossible_values_are_one_line(change: dict[str, Any], words: str) -> N
     """Each is refused before anything is computed, with value and limits."""
     with pytest.raises(CutcalError) as caught:
         Calibration(**{"food": "banana", "trace": BANANA, **change})
-    assert words in str(caught.value) and "\n" not in str(caught.value)
+    said = str(caught.value)
+    assert words in said and "\n" not in said and "  " not in said and said == said.strip()
+
+
+def test_numbers_may_be_text_with_a_unit() -> None:
+    """As on the command line: sizes, speeds, parts and frequencies; the call that is kept has what was written."""
+    given = {"width": "45mm", "dx": "3mm", "speed": "20 mm/s", "gain_sd": "5%", "bandwidth": "0.1kHz"}
+    request = Calibration("banana", BANANA, **given).request("out")
+    assert (request.sizing.width, request.dx, request.speed) == (0.045, 0.003, 0.02)
+    assert (request.gain_sd, request.bandwidth) == (0.05, 100.0)
+    assert "width='45mm'" in request.command[0]
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ({"timecol": "t"}, "argument 'timecol' is not known, did you mean 'time_col'?"),
+        ({"rate": "fast"}, "rate 'fast' is not positive"),
+    ],
+)
+def test_a_trace_that_is_read_knows_its_arguments(how: dict[str, Any], words: str) -> None:
+    """From a file and from a DataFrame."""
+    for given in (BANANA, pd.read_csv(BANANA, comment="#")):
+        with pytest.raises(CutcalError) as caught:
+            Trace.read(given, **how)
+        assert words in str(caught.value) and "__init__" not in str(caught.value)
 
 
 def test_foods_by_name_and_by_file(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import io
+import re
 from dataclasses import fields
 from inspect import signature
 from pathlib import Path
@@ -23,7 +24,7 @@ from calib.io.wording import as_arguments, in_arguments
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_file import Header, StoredEvaluation, hdf5_of
 from calib.validation.acceptance import Verdict
-from cutcal import Calibration, Food, Trace
+from cutcal import Calibration, Food, Study, Trace
 from cutcal.commands.calibration.calibrate import add_args
 from mpm.scene.errors import CutcalError
 from tests.data_dir import ROOT
@@ -63,6 +64,21 @@ def test_a_narrow_terminal_shows_every_column(
     assert len(table.columns) > 8 and set(table.columns) <= set(words) and set(table.index) <= set(words)
     assert "..." not in text and len(text.splitlines()[0]) <= columns
     assert repr(table[["value", "unit"]]).splitlines()[0].split() == ["value", "unit"]
+
+
+def test_curves_simulations_and_foods_show_every_column(
+    result: CalibrationResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a narrow terminal all names stand in the text; of many rows, the first and the last."""
+    monkeypatch.setenv("COLUMNS", "40")
+    food = Food.load("banana").frame()
+    for table in (result.curves, result.evaluations, food):
+        text = repr(table)
+        assert set(table.columns) <= set(text.split()) and "\\\n" in text  # which ends a part of a wide table
+    assert len(result.curves) > 60 and len(repr(result.curves).splitlines()) < 100
+    assert f"[{len(result.curves)} rows x {len(result.curves.columns)} columns]" in repr(result.curves)
+    source = Food.load("banana").properties["E"].source
+    assert food.loc["E", "source"] == source and source in repr(food)
 
 
 def test_every_option_is_an_argument_of_the_same_name() -> None:
@@ -130,6 +146,28 @@ def test_stages_and_folders_speak_of_arguments(tmp_path: Path) -> None:
     with pytest.raises(CutcalError) as caught:
         Calibration("banana", BANANA).run(tmp_path / "there")
     assert "there" in str(caught.value) and "--" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ({"progress": 5}, "progress = 5; give True for a bar, or a function"),
+        ({"say": "print"}, "say = 'print'; give a function"),
+        ({"resume": "yes"}, "resume = 'yes'; give True or False"),
+    ],
+)
+def test_listeners_are_tried_before_anything_is_simulated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: dict[str, Any], words: str
+) -> None:
+    """One that cannot be called, of a calibration and of a study, leaves no folder behind."""
+    for module in ("calibration", "multi_specimen"):
+        monkeypatch.setattr(f"calib.{module}.run.run", lambda *_, **__: pytest.fail("the run began"))
+    study = tmp_path / "study.yaml"
+    study.write_text(f"food: banana\ntraces:\n  a: {{trace: {BANANA}}}\n  b: {{trace: {BANANA}}}\n")
+    for one in (Calibration("banana", BANANA), Study.read(study)):
+        with pytest.raises(CutcalError, match=re.escape(f"{type(one).__name__}.run: {words}")):
+            one.run(tmp_path / "out", **how)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_notebook_rewrites_its_line() -> None:

@@ -76,6 +76,16 @@ def test_which_test_next(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert said.count("PICTURE") == 1 and "Graphical python shell" not in said
 
 
+def test_two_intervals_of_one_number_are_told_apart_where_they_stand() -> None:
+    """The one that tests are judged from is not the calibration's: the line says so, and gives that one too."""
+    said = shown(nbformat.read(NOTEBOOKS / NEXT, as_version=4))
+    lines = said.splitlines()
+    (k,) = [k for k, line in enumerate(lines) if line.startswith("now: ")]
+    own = re.search(r"own interval, which needs no such approximation: (\d+) to (\d+)", lines[k + 1])
+    assert "normal approximation" in lines[k] and own is not None
+    assert f"<td>{own[1]} to {own[2]}</td>" in said  # as the table of the result has it
+
+
 def test_each_is_run_and_shown() -> None:
     """No notebook without a test, none that the documentation does not have."""
     assert sorted(path.name for path in NOTEBOOKS.glob("*.ipynb")) == [FIRST, NEXT]

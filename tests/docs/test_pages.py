@@ -8,15 +8,19 @@ import re
 import shlex
 from pathlib import Path
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 
 import cutcal
 import mpm
+from calib.io.folder import prepare
 from calib.material.food import load_material_file
 from calib.material.knife import load_knife
 from calib.multi_specimen.study_file import read_study
+from calib.problem.request import Request
+from calib.simulation.workers import Workers
 from calib.uncertainty.estimates import FittedNuisance
 from calib.validation.acceptance import NUISANCE_LINES, Conservation, Verdict, judge
 from calib.validation.metrics import compare
@@ -228,6 +232,40 @@ def test_what_the_readme_shows_in_python_can_be_called() -> None:
     compile(blocks[0], "README.md", "exec")
     for module, names in re.findall(r"^from (\w+) import (.+)$", blocks[0], flags=re.MULTILINE):
         assert all(hasattr(importlib.import_module(module), name.strip()) for name in names.split(","))
+
+
+def test_a_shell_finds_the_commands_of_the_readme() -> None:
+    """What is installed into a folder is called by it, until the folder is on the PATH."""
+    blocks = re.findall(r"^```bash\n(.*?)^```", read(README), flags=re.MULTILINE | re.DOTALL)
+    lines = "".join(blocks).splitlines()
+    active = lines.index("source .venv/bin/activate")
+    assert not [line for line in lines[:active] if re.match(r"(cutcal|calibrate|pip|pytest) ", line)]
+    assert [line for line in lines[active:] if line.startswith("calibrate ")]
+    before = read(README).partition("source .venv/bin/activate")[0]
+    assert "`cutcal doctor`" not in before and "`.venv/bin/python`" in before
+
+
+@pytest.mark.parametrize("path", [README, DOCS / "python.md"], ids=name_of)
+def test_the_first_python_of_a_page_runs_after_the_commands_of_the_readme(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It takes no folder that one of them has written; a folder that is checked stands for the calibration."""
+
+    def only_prepared(request: Request, out: Path, pool: Workers, **how: Any) -> MagicMock:
+        with prepare(out, "calibrate", resume=False):
+            return MagicMock()  # the result, of any values
+
+    written = [tmp_path / folder for folder in re.findall(r" --out (\S+)", "\n".join(commands(read(README))))]
+    assert tmp_path / "runs" / "banana" in written
+    for folder in written:
+        folder.mkdir(parents=True)
+        (folder / "summary.json").write_text("{}")
+    (tmp_path / "force_data").symlink_to(ROOT / "force_data")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("calib.calibration.run.run", only_prepared)
+    exec(re.findall(r"^```python\n(.*?)^```", read(path), flags=re.MULTILINE | re.DOTALL)[0], {})
+    made = {folder for folder in (tmp_path / "runs").iterdir()} | set(tmp_path.glob("cutcal-*"))
+    assert len(made) == len(written) + 1
 
 
 @pytest.mark.parametrize("path", TEXTS, ids=name_of)

@@ -5,15 +5,21 @@ from __future__ import annotations
 import argparse
 import math
 import re
+from textwrap import wrap
 
 from calib.io.schema import tag
 from calib.material.food import FoodSpec, load_food, load_foods
 from calib.material.own_food import template
 from calib.material.properties import FORM, PROPERTIES
+from calib.material.references import remarks
 from cutcal.options import add_json, print_json
 from mpm.output.number_text import terminal_rung
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
+CITED = re.compile(r"\(remarks? (\d[\d, and]*)\)")
+"""Where the source of a value refers to remarks of materials.yaml."""
+WIDTH = 100
+"""Letters in a line of a remark."""
 HELP = "list the foods, or the values of one with their sources"
 DESCRIPTION = """List the foods of materials.yaml, or every value of one with range, status and
 source. A YAML file of your own does in place of a name, here and for --food."""
@@ -70,16 +76,27 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print_json({"schema": tag("food"), food.name: food.as_dict(), "warnings": food.warnings()})
         return 0
-    print(f"{food.name}: {_outline(food)} (length x width x height)")
+    said = [f"{food.name}: {_outline(food)} (length x width x height)"]
     for name, sizes in food.inclusions.items():
         size = " x ".join(f"{sizes[n].value * 1e3:g}" for n in ("length", "width", "height"))
-        print(f"  {name:17s}{size} mm in a cut that asks for it (--{name})")
+        said.append(f"  {name:17s}{size} mm in a cut that asks for it (--{name})")
     for name in (*FORM, *PROPERTIES):
         p = food.roundness if name in FORM else food.properties.get(name)
         if p is not None:
             factor, unit = terminal_rung(p.unit, p.value)
             text = f"{p.value / factor:g} {unit}"
-            print(f"  {name:17s}{text:12s} {p.low / factor:g} to {p.high / factor:g}, {p.status}: {p.source}")
-    for warning in food.warnings():
-        print(f"  ! {warning}")
+            said.append(f"  {name:17s}{text:12s} {p.low / factor:g} to {p.high / factor:g}, {p.status}: {p.source}")
+    said += [f"  ! {warning}" for warning in food.warnings()]
+    print("\n".join([*said, *_remarks("\n".join(said))]))
     return 0
+
+
+def _remarks(text: str) -> list[str]:
+    """The remarks of materials.yaml that a text refers to, in lines that a terminal shows."""
+    cited = {number for numbers in CITED.findall(text) for number in re.findall(r"\d+", numbers)}
+    return [
+        line
+        for number, remark in remarks().items()
+        if number in cited
+        for line in wrap(f"remark {number}: {remark}", WIDTH, initial_indent="  ", subsequent_indent="    ")
+    ]

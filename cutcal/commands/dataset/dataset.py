@@ -163,13 +163,15 @@ def table(document: DatasetDocument, *, rendered: bool) -> str:
         f"{found.severed} are in pieces",
         f"  {seconds.solver:.1f} s of one core in the solver and {seconds.robot:.1f} s in the robot simulator each; "
         f"the longest {found.most_solver_s:.0f} s",
-        f"  21,000 of them: {found.core_hours_of_21000:.0f} core hours; {found.bytes / 1e6:.1f} MB now",
+        f"  {found.bytes / 1e6:.1f} MB; at this pace the 21,000 trajectories of the published data set take "
+        f"{found.core_hours_of_21000:.0f} core hours",
     ]
     if rendered and pictures is not None:
         lines += [
             f"  {pictures.number} pictures before {len(pictures.scenes)} backgrounds: "
             f"{pictures.seconds_per_episode:.1f} s of one core for each trajectory and background",
-            f"  21,000 before 15: {pictures.core_hours_of_315000:.0f} core hours; {pictures.bytes / 1e6:.1f} MB now",
+            f"  {pictures.bytes / 1e6:.1f} MB; at this pace those 21,000 before its 15 backgrounds take "
+            f"{pictures.core_hours_of_315000:.0f} core hours",
         ]
     return "\n".join([*lines, *(f"  trajectory {broken.index}: {broken.status}" for broken in found.broken)])
 
@@ -246,5 +248,9 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
     elif not args.json and args.format == "rdt":
         print(f"{sum(t['episodes'] for t in found.values())} episodes of {len(found)} tasks")
     elif not args.json:
-        print(f"{found['total_episodes']} episodes of {found['total_frames']} frames, {found['total_tasks']} sentences")
+        each = "for each trajectory, background and sentence" if backgrounds else "for each trajectory and sentence"
+        print(
+            f"{found['total_episodes']} episodes of {found['total_frames']} frames: one {each} that asks for it "
+            f"({found['total_tasks']} sentences in all)"
+        )
     return found

@@ -54,6 +54,16 @@ def test_what_a_file_leaves_out_is_wide_and_said(tmp_path: Path) -> None:
     assert FoodSpec.load(written(tmp_path, given)).properties == p
 
 
+@pytest.mark.parametrize("properties", ["", "  properties:\n", "  properties: {}\n"])
+def test_a_file_of_a_shape_alone_is_a_food(tmp_path: Path, properties: str) -> None:
+    """All properties may be left out: each then has its default, and is flagged."""
+    path = tmp_path / "gel.yaml"
+    path.write_text(f"gel:\n  shape:\n    kind: block\n{SIZES}{properties}", encoding="utf-8")
+    food = load_food(str(path))
+    assert set(OPTIONAL_HERE) <= set(food.properties) and len(food.warnings()) == len(OPTIONAL_HERE)
+    assert food.shape_kind == "block"
+
+
 def test_null_is_an_answer(tmp_path: Path) -> None:
     """A food whose file says that it has no tensile strength of its own gets none."""
     assert "strength_ratio" not in load_food(written(tmp_path, "{tensile_strength: null}")).properties

@@ -224,9 +224,20 @@ def test_a_store_of_something_else_is_refused(tmp_path: Path, header: Header, wo
 def test_an_existing_store_is_not_overwritten(tmp_path: Path) -> None:
     """Without --resume a store that exists is left alone and the user told what to do."""
     path = tmp_path / "evaluations.h5"
-    EvaluationStore(path, HEADER).close()
+    with EvaluationStore(path, HEADER) as store:
+        store.append("key", evaluation(), "fine")
     with pytest.raises(OutputError, match="exists already; add --resume"):
         EvaluationStore(path, HEADER)
+
+
+def test_a_store_without_a_run_leaves_no_file(tmp_path: Path) -> None:
+    """A run that was refused before its first simulation can be tried again in the same folder."""
+    with pytest.raises(OutputError, match="no device"), EvaluationStore(tmp_path / "evaluations.h5", HEADER):
+        raise OutputError("no device")
+    assert list(tmp_path.iterdir()) == []
+    with EvaluationStore(tmp_path / "evaluations.h5", HEADER, resume=True) as store:
+        store.append("key", evaluation(), "fine")
+    assert [path.name for path in tmp_path.iterdir()] == ["evaluations.h5"]
 
 
 def test_foreign_files_and_missing_folders_are_refused(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import lzma
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ import pytest
 from calib.errors import TraceError
 from calib.trace.conditioning import Conditioned, condition
 from calib.trace.trace import Trace, read_trace
+from cutcal import Calibration
 from tests.calib.made_cuts import made_cut, plain_rows, text_of
 
 CUT = made_cut()
@@ -24,7 +26,7 @@ EPOCH = 1_700_000_000
 HEADER = "time_s,force_N,position_m"
 
 
-def read(folder: Path, text: str | bytes, name: str = "cut.csv", **how: str) -> Trace:
+def read(folder: Path, text: str | bytes, name: str = "cut.csv", **how: Any) -> Trace:
     """The trace in a text."""
     path = folder / name
     path.write_bytes(text.encode() if isinstance(text, str) else text)
@@ -238,3 +240,108 @@ def test_a_clock_that_begins_again_while_the_knife_moves_on(tmp_path: Path) -> N
     cells = [(f"{t:.4f}", *row[1:]) for t, row in zip(time, plain_rows(CUT), strict=True)]
     done = is_the_cut(read(tmp_path, text_of(HEADER, cells)))
     assert any("the clock jumps back by 1.5" in note for note in done.warnings), done.warnings
+
+
+CUT_AND = "time_s,force_N"
+"""Columns of a record without a position."""
+JOINTS = [f"{kind}{k}" for kind in ("q", "dq", "tau") for k in range(7)]
+
+
+@pytest.mark.parametrize(
+    ("header", "how", "words"),
+    [
+        (CUT_AND + ",position_m", {}, None),
+        (CUT_AND + ",frame", {}, None),
+        (CUT_AND + ",temp_C,operator", {}, "temp_C, operator"),
+        ("time_s,Fx_N,Fz_N", {"force_col": "Fz_N"}, "Fx_N"),
+        (
+            CUT_AND + ",Prüfweg [mm]",
+            {},
+            "Prüfweg [mm] (a length; --position-col takes it as the knife's height, --depth-col as its depth)",
+        ),
+        (CUT_AND + ",Prüfweg [mm]", {"position_col": "none"}, "Prüfweg [mm]"),
+        (CUT_AND + ",weg", {}, "weg (no unit; if it is the knife's place: --position-col 'weg=mm')"),
+        (CUT_AND + ",position_m,Prüfweg [mm]", {}, "Prüfweg [mm]"),
+        (",".join([CUT_AND, *JOINTS]), {}, "q0, q1, q2, q3, q4 and 16 more columns"),
+    ],
+)
+def test_columns_that_are_not_used_are_named(
+    tmp_path: Path, header: str, how: dict[str, Any], words: str | None
+) -> None:
+    """One sentence names them, what could be the knife's place with its option, and of many the first."""
+    number = {"time_s": 0, "force_N": 1, "Fz_N": 1, "position_m": 2}
+    cells = [
+        ",".join(row[number[name]] if name in number else str(k) for name in header.split(","))
+        for k, row in enumerate(rows())
+    ]
+    trace = read(tmp_path, "\n".join([header, *cells]), **how)
+    said = [note for note in trace.notes if note.startswith("cut.csv: not used: ")]
+    assert said == ([] if words is None else [f"cut.csv: not used: {words}"])
+
+
+def test_no_column_is_called_unused_twice(tmp_path: Path) -> None:
+    """What another note names is left to it: a clock beside a rate, and a force that was commanded."""
+    cells = [f"{row[0]},{row[1]},0.0" for row in rows()]
+    beside = read(tmp_path, "\n".join(["time_s,force_N,temp_C", *cells]), rate=1000.0)
+    assert [note.partition(": ")[2] for note in beside.notes] == [
+        "time is counted by rows at 1000 a second (--rate); the clock time_s is not used",
+        "not used: temp_C",
+    ]
+    bare = read(tmp_path, "\n".join(["time_s,Fz,target_force_N", *cells]))
+    assert len(bare.notes) == 1 and "target_force_N" in bare.notes[0]
+
+
+def test_a_check_names_the_columns_that_are_not_used(tmp_path: Path) -> None:
+    """From the command line with its options, and from Python with its arguments."""
+    path = tmp_path / "cut.csv"
+    path.write_text("\n".join(["time_s,force_N,Prüfweg [mm]", *(",".join(row) for row in rows())]), encoding="utf-8")
+    (said,) = [line for line in Calibration("banana", path).check().splitlines() if "not used" in line]
+    assert said.startswith("note: cut.csv: not used: Prüfweg [mm] (a length; position_col takes it")
+
+
+@pytest.mark.parametrize(
+    ("how", "missing"),
+    [
+        ({"time_col": "zeit", "force_col": "kraft", "position_col": "weg"}, ["zeit", "kraft", "weg"]),
+        ({"time_col": "zeit", "force_col": "kraft", "depth_col": "weg"}, ["zeit", "kraft", "weg"]),
+        ({"force_col": "kraft", "position_col": "weg"}, ["kraft", "weg"]),
+        ({"time_col": "zeit", "position_col": "weg"}, ["zeit", "weg"]),
+        ({"position_col": "weg"}, ["weg"]),
+    ],
+)
+def test_all_columns_that_are_missing_are_named_at_once(
+    tmp_path: Path, how: dict[str, str], missing: list[str]
+) -> None:
+    """One error for time, force and place, which says once what columns there are."""
+    with pytest.raises(TraceError) as caught:
+        read(tmp_path, text_of("time_s,force_N", [row[:2] for row in rows()]), **how)
+    options = {name: option for option, name in how.items()}
+    said = [f"no column '{name}' (--{options[name].replace('_', '-')})" for name in missing]
+    said[0] += "; the columns are time_s, force_N"
+    assert str(caught.value) == f"cut.csv: {'; and '.join(said)}"
+
+
+@pytest.mark.parametrize("fault", ["late", "twice", "ticks"])
+def test_a_record_from_its_end_may_have_other_faults(tmp_path: Path, fault: str) -> None:
+    """It is turned round first, and said; then a row that came late, one that is there twice, or a slow clock."""
+    cells = plain_rows(CUT)[::-1]
+    if fault == "late":
+        cells[50], cells[51] = cells[51], cells[50]
+    elif fault == "twice":
+        cells[50] = cells[49]
+    else:
+        cells = [(f"{int(25 * float(row[0])) / 25:.2f}", *row[1:]) for row in cells]
+    trace = read(tmp_path, text_of(HEADER, cells))
+    assert trace.notes[0] == "cut.csv: time falls from row to row; the record was turned round"
+    assert len(trace.notes) == 2
+    is_the_cut(trace)
+
+
+@pytest.mark.parametrize(("word", "there"), [("nan", True), ("", True), ("left out", False)])
+def test_rows_without_a_number_are_told_from_rows_that_are_not_there(tmp_path: Path, word: str, there: bool) -> None:
+    """A gap that is bridged: in the file are rows with nan or nothing in them, or none."""
+    cells = plain_rows(CUT)
+    cells[300:306] = [(row[0], word, row[2]) for row in cells[300:306]] if there else []
+    said = [note for note in condition(read(tmp_path, text_of(HEADER, cells))).warnings if "a line bridges it" in note]
+    what = "rows without a number (empty or nan) were written" if there else "no samples were written"
+    assert len(said) == 1 and f": {what} for " in said[0]

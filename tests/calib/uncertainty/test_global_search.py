@@ -152,7 +152,7 @@ def test_a_better_food_becomes_the_answer():
     assert analysis is not None
     found = global_search._compared(analysis, first, result, [narrow])
     assert "better, by" in found.remarks[0] and verdicts(found)["R"] == "weak", "the first answer lies outside"
-    assert "the food of the first search had another" in found.remarks[1]
+    assert "the food of the first search had another, so not called identified" in found.remarks[1]
     assert found.uncertainty.intervals[1].low95 == analysis.uncertainty.intervals[1].low95
     near = replace(first, best=goal.score(replace(result.best.evaluation)))
     assert verdicts(global_search._compared(analysis, near, result, [narrow]))["R"] == "identified"

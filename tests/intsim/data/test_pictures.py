@@ -145,16 +145,21 @@ def test_one_command_makes_trajectories_and_pictures(tmp_path, monkeypatch, caps
     assert main(words) == 0
     told = capsys.readouterr().out
     assert "288 pictures before 2 backgrounds" in told and "core hours" in told
+    assert "at this pace the 21,000 trajectories of the published data set take" in told
+    assert "at this pace those 21,000 before its 15 backgrounds take" in told
     assert main([*words, "--resume", "--json"]) == 0
     assert valid(json.loads(capsys.readouterr().out))["pictures"]["scenes"] == [0, 2]
     monkeypatch.setattr("cutcal.commands.dataset.dataset.workers_of", lambda args, say: Here(0))
     pytest.importorskip("pyarrow", reason="the extra [data] is not installed")
     pytest.importorskip("av", reason="the extra [data] is not installed")
     export = ["dataset", "export", str(out), "--scenes", "0,2", "--pixels", "32", "--out"]
-    assert (
-        main([*export, str(tmp_path / "lerobot")]) == 0
-        and main([*export, str(tmp_path / "rlds"), "--format", "rlds"]) == 0
-    )
+    assert main([*export, str(tmp_path / "lerobot")]) == 0
+    told = capsys.readouterr()
+    info = json.loads((tmp_path / "lerobot" / "meta" / "info.json").read_text())
+    whole = f"{info['total_episodes']} episodes of {info['total_frames']} frames: one for each trajectory, background"
+    assert f"{whole} and sentence that asks for it ({info['total_tasks']} sentences in all)" in told.out
+    assert "trajectory before a background 6 of 6" in told.err and "episode" not in told.err
+    assert main([*export, str(tmp_path / "rlds"), "--format", "rlds"]) == 0
 
 
 @pytest.mark.parametrize("export", [export_lerobot, export_rlds, export_rdt])
