@@ -141,7 +141,8 @@ class Calibration:
             records = self._record(self.trace), None if self.air is None else self._record(self.air)
             object.__setattr__(self, "_food", food.with_values(self.set) if self.set else food)
             object.__setattr__(self, "_records", records)
-            given = Sizing(self.shape, *(self._number(name) for name in ("height", "width", "length")), self.at)
+            height, width, length = (self._number(name) for name in ("height", "width", "length"))
+            given = Sizing(self.shape, height, width, length, self.at)
             file = OutlineFile(self.outline, self.scale, self.outline_as)
             object.__setattr__(self, "_sizing", file.sizing(given))
 
