@@ -277,7 +277,7 @@ def _speed(result: CalibrationResult) -> str:
         return "a speed that its older files do not say"
     said = f"{quantity(cut.mach, '-')} of the speed of pressure waves in the food"
     E, nu, rho = (_value(result, name) for name in ("E", "nu", "rho"))
-    if None not in (E, nu, rho):
+    if E is not None and nu is not None and rho is not None:
         at = cut.mach * Material(E=E, nu=nu, rho=rho).p_wave
         said += f", {quantity(at, 'm/s', digits=2)}"
         real = cut.speed_real_m_s
