@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from numbers import Real
 from pathlib import Path
@@ -48,7 +48,7 @@ KINDS: Mapping[str, tuple[tuple[type, ...], str]] = {
     "rate": ((Real,), "the rows a second"),
     "set": ((Mapping,), "a dict such as {'E': 2e5}"),
     "columns": ((Mapping,), "a dict such as {'force_col': 'Fz=N'}"),
-    "fit": ((Iterable,), "a list of names, such as ['E', 'R']"),
+    "fit": ((Sequence,), "a list of names, such as ['E', 'R']"),
 }
 """What arguments of a calibration may be, and in words; None where that is the default."""
 

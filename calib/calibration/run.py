@@ -212,6 +212,7 @@ class _Calibration:
         if more:
             self.say(f"simulating the best values once more: {QUARTER_SPEED}, as half of it still changes the force")
             self.pool.errands(self._counted(more))
+        self.clock.closing(WRITING)
         checks = check(scene, best, self.store, way, self._fitted) if ended else []
         start = self._start_curve() if ended else np.full_like(setup.curve.stroke, np.nan)
         sized = setup.sized(best.parameters)
@@ -226,8 +227,7 @@ class _Calibration:
             def keep(made: Any) -> None:
                 errand.keep(made)
                 number = next(numbers)
-                words = WRITING if number == whole else f"last simulations, {number} of {whole}"
-                self.clock.last(words, number, whole)
+                self.clock.last(f"last simulations, {number} of {whole}", number, whole)
 
             return replace(errand, keep=keep)
 

@@ -142,13 +142,21 @@ class RunClock:
             self._more, self._round = self._more + self._round + self._lasting, 0
         self._lasting = done
         expected = LAST_RUNS * self._each * (1.0 - done / whole)
-        if done == whole:
-            self._stage(words, CLOSING_S, MOST_CLOSING_S)
+        if done == whole:  # more of them may follow
+            self._stage(words, math.nan, math.nan)
             return
         took = self._now() - self._last_began
         longest = took * (whole - done) / done if done else expected  # were they all as long: the longest come first
         usual = min(longest, max(expected, took))
         self._stage(words, usual + CLOSING_S, max(expected, longest) * SLOWER + MOST_CLOSING_S)
+
+    def closing(self, words: str) -> None:
+        """All simulations are done; figures and report are left.
+
+        Args:
+            words: What is being done.
+        """
+        self._stage(words, CLOSING_S, MOST_CLOSING_S)
 
     def _typically(self) -> float:
         """Time left in a typical run [s]: never less than the last simulations and the report take."""

@@ -120,7 +120,7 @@ def compared(value: float | None, unit: str) -> str:
     return quantity(value, unit, digits=3 if 0.01 / first <= COMPARED_STEP else 4)
 
 
-def difference(first: float, second: float, unit: str) -> tuple[str, str, str]:
+def difference(first: float | None, second: float | None, unit: str) -> tuple[str, str, str]:
     """Two values that are compared and the first less the second, in the unit and to the decimals of the second.
 
     The difference is that of the two numbers as they are printed, so that a reader who computes it finds the same.
@@ -131,13 +131,18 @@ def difference(first: float, second: float, unit: str) -> tuple[str, str, str]:
         unit: SI unit, as of :func:`quantity`.
 
     Returns:
-        Both values and the difference, with its sign.
+        Both values and the difference, with its sign; a dash for what is not known.
 
     >>> [text.replace(NBSP, " ") for text in difference(44.4356, 46.134, "N")]
     ['44.44 N', '46.13 N', '−1.69 N']
+    >>> [text.replace(NBSP, " ") for text in (*difference(0.3, 0.0, "N"), *difference(math.nan, 1.0, "N"))]
+    ['0.3000 N', '0.0000 N', '+0.3000 N', '–', '1.000 N', '–']
     """
-    factor, name = rung(unit, abs(second))
-    number = compared(second, unit).split(NBSP + name)[0] if name else compared(second, unit)
+    if first is None or second is None or not (math.isfinite(first) and math.isfinite(second)):
+        return (compared(first, unit), compared(second, unit), DASH)
+    of = second or first
+    factor, name = rung(unit, abs(of))
+    number = compared(of, unit).split(NBSP + name)[0] if name else compared(of, unit)
     places = len(number.partition(".")[2])
     printed = [round(value / factor, places) for value in (first, second)]
     less = round(printed[0] - printed[1], places)

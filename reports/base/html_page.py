@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+import re
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -71,9 +72,7 @@ def page(film: Film, path: Path, title: str) -> None:
         "CUT": json.dumps(content(film, go), separators=(",", ":")).replace("<", "\\u003c"),
         "PLOTLY": get_plotlyjs(),
     }
-    text = TEMPLATE.read_text(encoding="utf-8")
-    for name, part in parts.items():
-        text = text.replace(f"@{name}@", part)
+    text = re.sub("@(TITLE|CUT|PLOTLY)@", lambda found: parts[found[1]], TEMPLATE.read_text(encoding="utf-8"))
     try:
         write_atomic(path, packed(text))
     except OSError as e:

@@ -14,7 +14,7 @@ WORDS = {
     "three_term": "three-term curve (7 numbers)",
     "weak": "weakly identified",
     "one_sided": "one-sided",
-    "only_as_product": "only as a product with the width",
+    "only_as_product": "only as a product",
     "not_seen": "not seen",
     "at_bound": "at its bound",
     "at_limit": "at its natural limit",

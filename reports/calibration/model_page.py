@@ -253,7 +253,7 @@ def _conditions(result: CalibrationResult) -> list[list[str]]:
     """Letter of the sketch, and what holds there."""
     cut = result.cut
     speed = _speed(result)
-    up = "" if result.withdrawal is None else ", then up again at the same speed"
+    up = "" if result.withdrawal is None else "; then up again at the first speed"
     gravity = _part(result, "numerics", "gravity")
     weight = "" if gravity is None else f", gravity of {quantity(gravity, '-')} m/s²"
     rows = [
@@ -280,10 +280,10 @@ def _speed(result: CalibrationResult) -> str:
     if E is not None and nu is not None and rho is not None:
         at = cut.mach * Material(E=E, nu=nu, rho=rho).p_wave
         said += f", {quantity(at, 'm/s', digits=2)}"
-        real = cut.speed_real_m_s
-        if real is None and trace is not None:
+        if cut.speed_real_m_s is not None:
+            said += f", where the real one is {quantity(cut.speed_real_m_s, 'm/s', digits=2)}"
+        elif trace is not None:
             real = trace.stroke_m / (trace.end_s - trace.onset_s)
-        if real is not None:
             said += f", where the trace has {quantity(real, 'm/s', digits=2)} on average"
     end = _part(result, "motion", "end_speed")
     if end is not None and end < 1.0:

@@ -77,9 +77,11 @@ def _stored(path: Path) -> StoredCut | None:
 
 
 def not_fitted(s: Data, known: Known) -> dict[str, Data]:
-    """The properties of the food that no cut was fitted in."""
+    """The properties that no cut was fitted in, but for what starts a cut in bare flesh where a skin starts it."""
     fitted = {name.partition("@")[0] for name in s["parameters"]}
-    return {name: p for name, p in known.properties.items() if name not in fitted}
+    skin = "skin_thickness" in fitted or bool((known.properties.get("skin_thickness") or {}).get("value"))
+    unused = {"R_initiation"} if skin else set()
+    return {name: p for name, p in known.properties.items() if name not in fitted | unused}
 
 
 def as_calibration(s: Data, name: str, known: Known, cited: Cited) -> Any:

@@ -161,7 +161,7 @@ def _model(c: Data) -> Markup:
         element("h2", "The model"),
         element("p", w["method"]),
         table(head, w["cuts"], (4, 5, 6, 7), id="cuts", label="The cuts as they were simulated"),
-        table(("Part", "Law", "Properties"), laws, label="Laws"),
+        *([table(("Part", "Law", "Properties"), laws, label="Laws")] if laws else []),
     ]
     if w["conditioning"]:
         parts += [element("h3", "From record to curve"), table(kept, w["conditioning"], (2, 4, 5, 6), label="Records")]

@@ -256,6 +256,8 @@ def test_the_first_python_of_a_page_runs_after_the_commands_of_the_readme(
             return MagicMock()  # the result, of any values
 
     written = [tmp_path / folder for folder in re.findall(r" --out (\S+)", "\n".join(commands(read(README))))]
+    if path != README:  # whose own Python may have been tried before
+        written += [tmp_path / folder for folder in re.findall(r'\.run\("(\S+)"\)', read(README))]
     assert tmp_path / "runs" / "banana" in written
     for folder in written:
         folder.mkdir(parents=True)

@@ -364,7 +364,7 @@ def _draw(
     if args.page:
         say("writing cut.html")
         page(
-            replace(film, looks=film.looks[::FRAMES_PER_PAGE_FRAME]),
+            replace(film, looks=[*film.looks[:-1:FRAMES_PER_PAGE_FRAME], film.looks[-1]]),
             out / "cut.html",
             f"{food}, {film.scene.knife.name} knife",
         )

@@ -451,7 +451,7 @@ def test_the_model_page_says_that_the_blade_is_withdrawn() -> None:
     """In the conditions and in what is minimised, and nothing of it where it was not fitted."""
     for up in (None, object()):
         result = slow_cut(withdrawal=up)
-        assert ("up again at the same speed" in model_page._conditions(result)[0][1]) == (up is not None)
+        assert ("then up again at the first speed" in model_page._conditions(result)[0][1]) == (up is not None)
         said = model_page._objective(result)
         assert ("the pull on the way up" in said and "10 % of the largest pull" in said) == (up is not None)
 
