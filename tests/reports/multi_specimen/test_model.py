@@ -87,7 +87,7 @@ def test_the_pdf_alone_has_all_values(tmp_path: Path) -> None:
     assert got["model"]["references"][int(linked[1 : linked.index("]")]) - 1].startswith("Koh")
     run = study.write_study(tmp_path / "without")
     (run / "material.yaml").unlink()
-    assert "which has no material.yaml" in words(run)
+    assert "could not be read from material.yaml" in words(run)
 
 
 def test_a_value_outside_its_prior_and_far_from_a_test_is_named(tmp_path: Path) -> None:
