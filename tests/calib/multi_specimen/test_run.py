@@ -92,7 +92,7 @@ class FakePool(Workers):
 def fake_pool(monkeypatch: pytest.MonkeyPatch) -> None:
     """No particles in this file, and no report but that of ``finished``."""
     monkeypatch.setattr(cutcal.commands.calibration.calibrate, "workers_of", lambda args, say: FakePool())
-    monkeypatch.setattr("reports.multi_specimen.report.write_report", lambda out, meanings: None)
+    monkeypatch.setattr("reports.multi_specimen.report.write_report", lambda out, meanings, cited: None)
 
 
 @pytest.fixture

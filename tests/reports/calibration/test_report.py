@@ -52,7 +52,7 @@ def content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Content:
 # ---- the document
 
 
-@pytest.mark.parametrize(("kind", "count"), [("good", 8), ("reconstructed", 8), ("failed", 8), ("interrupted", 6)])
+@pytest.mark.parametrize(("kind", "count"), [("good", 8), ("reconstructed", 8), ("failed", 9), ("interrupted", 6)])
 def test_every_outcome_gives_a_pdf_of_the_planned_length(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, count: int
 ) -> None:
