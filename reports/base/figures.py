@@ -188,7 +188,7 @@ def conditioning(record: ConditioningRecord, curves: Curves) -> bytes:
         handles, labels = panels["raw"].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=4 if len(labels) < 5 else 3)
 
-    return svg(draw, 102.0)
+    return svg(draw, 78.0)
 
 
 def fit(curves: Curves, noise_sd: float, trace: str) -> bytes:

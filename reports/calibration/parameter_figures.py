@@ -196,7 +196,7 @@ def influence(found: Mapping[str, Mapping[str, SobolIndices]], labels: Mapping[s
         figure.supxlabel("part of the variance", fontsize=7.5)
         figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
 
-    return svg(draw, 24.0 + max(4.0, 5.5 - 0.1 * len(names)) * len(names))
+    return svg(draw, 22.0 + max(3.5, 5.5 - 0.15 * len(names)) * len(names))
 
 
 def correlations(names: Sequence[str], matrix: np.ndarray) -> bytes:
