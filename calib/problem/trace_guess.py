@@ -4,13 +4,14 @@ A curve may be that of an edge that pays for new surface, of faces that press th
 descent (:mod:`calib.fit.descent`) seldom leads from one to another. So several begin, each at another food, and go on
 as long as they may win:
 
-- The usual food, from the literature, and the same food with little friction. Friction multiplies what the other two
-  bear, so that much of it hides them: a descent finds its way to much friction, and not back.
+- The usual food, from the literature, and a stiffer one that hardly rubs. Friction multiplies what the other two bear, so
+  that much of it hides them: a descent finds its way to much friction, and not back.
 - What the trace itself says, where it says something: of layers (:mod:`calib.problem.layer_guess`), or of the start of
   a cut. That is a peak with a dip behind it. It tells two numbers: the force at which the cut starts, over the chord
   that the edge has met, and the dent under the edge. How much of the rest the edge bears it does not tell. So there is
   a start for either: a food that costs the edge nearly all of the force, and a stiffer one that costs it a quarter.
-- Where the board's suction is fitted, the stiffest of these on a board that hardly holds it. How firmly the halves of a
+- Where the board's suction is fitted, the stiffest food that the trace tells of, else the usual one with a third of its
+  friction, on a board that hardly holds it. How firmly the halves of a
   stiff food are held decides the second half of its force, so a food that is hardly held has a narrow valley of its
   own, and no descent from a food that is held came to it.
 """
@@ -31,11 +32,14 @@ DIP = 0.05
 """Part of its height by which the force falls behind a peak that is the start of a cut."""
 NOISE_SD = 4.0
 """The same in standard deviations of the curve's noise."""
-FACES_EDGE_PART, FACES_STIFFER = 0.25, 1.0
-"""Part of the force that the edge takes where the faces bear most of it, and by how many standard deviations of its
-prior such a food is stiffer than usual."""
+FACES_EDGE_PART = 0.25
+"""Part of the force that the edge takes where the faces bear most of it."""
+STIFFER = 1.0
+"""By how many standard deviations of its prior a stiffer food is stiffer than usual."""
 FACES_FRICTION_PART = 0.7
 """Friction of such a food over the usual."""
+SLIPPERY_PART = 1 / 15
+"""Friction of a food that hardly rubs over the usual."""
 PLATEAU = (0.25, 0.85)
 """Part of the stroke over which the force for each length of the edge is looked at."""
 LEAST_CHORD = 1e-3
@@ -59,13 +63,24 @@ def trace_guesses(
     """
     seen = layer_guesses(scene, parameters, stroke, curve) or _peak_guesses(scene, parameters, stroke, curve, noise_sd)
     found = seen or (parameters.start,)
-    slippery = (
-        (guess_at(parameters, {"mu": FRICTION_PART * parameters["mu"].value}),) if "mu" in parameters.names else ()
-    )
-    held = *slippery, *found
+    usual_mu = parameters["mu"].value if "mu" in parameters.names else None
+    slippery = () if usual_mu is None else (_hardly_rubs(parameters, usual_mu),)
+    less = () if usual_mu is None else (guess_at(parameters, {"mu": FRICTION_PART * usual_mu}),)
     # what every trace has comes first: a fit of several goes on from the first of each together, and so on
-    loose = (_hardly_held(parameters, held),) if BOARD_SUCTION in parameters.names else ()
+    loose = (_hardly_held(parameters, (*less, *found)),) if BOARD_SUCTION in parameters.names else ()
     return *slippery, *loose, *found
+
+
+def _hardly_rubs(parameters: ParameterSet, usual_mu: float) -> FloatArray:
+    """A stiffer food than usual that hardly rubs."""
+    return guess_at(parameters, _stiffer(parameters) | {"mu": SLIPPERY_PART * usual_mu})
+
+
+def _stiffer(parameters: ParameterSet) -> dict[str, float]:
+    """Young's modulus and yield stress of a food that is stiffer than usual, where they are fitted."""
+    names = [name for name in ("E", "yield_stress") if name in parameters.names]
+    factor = float(np.exp(STIFFER * parameters["E"].prior_sd)) if "E" in parameters.names else 1.0
+    return {name: factor * parameters[name].value for name in names}
 
 
 def _hardly_held(parameters: ParameterSet, guesses: Sequence[FloatArray]) -> FloatArray:
@@ -117,8 +132,7 @@ def _peak_guesses(
     found = dict.fromkeys(starts, EDGE_PART * curve[peak] / chord[peak]) | {
         "initiation_depth": EDGE_PART * stroke[peak]
     }
-    stiffer = float(np.exp(FACES_STIFFER * parameters["E"].prior_sd))
-    faces = found | {name: stiffer * usual[name] for name in ("E", "yield_stress") if name in usual}
+    faces = found | _stiffer(parameters)
     edge = found | {"R": EDGE_PART * line}
     faces |= {"R": FACES_EDGE_PART * line}
     if "mu" in usual:
