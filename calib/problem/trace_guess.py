@@ -11,9 +11,9 @@ as long as they may win:
   that the edge has met, and the dent under the edge. How much of the rest the edge bears it does not tell. So there is
   a start for either: a food that costs the edge nearly all of the force, and a stiffer one that costs it a quarter.
 - Where the board's suction is fitted, the stiffest food that the trace tells of, else the usual one with a third of its
-  friction, on a board that hardly holds it. How firmly the halves of a
-  stiff food are held decides the second half of its force, so a food that is hardly held has a narrow valley of its
-  own, and no descent from a food that is held came to it.
+  friction, on a board that hardly holds it. How firmly the halves of a stiff food are held decides the second half of
+  its force, so a food that is hardly held has a narrow valley of its own, and no descent from a food that is held came
+  to it.
 """
 
 from __future__ import annotations
@@ -84,7 +84,8 @@ def _stiffer(parameters: ParameterSet) -> dict[str, float]:
 
 
 def _hardly_held(parameters: ParameterSet, guesses: Sequence[FloatArray]) -> FloatArray:
-    """The stiffest of some starts on a board that hardly holds it: its suction is at the low end of its prior."""
+    """The stiffest of some starts on a board that hardly holds it, the first of equals: its suction is at the low end of
+    its prior."""
     values = [parameters.to_dict(z) for z in guesses]
     stiffest = max(values, key=lambda one: one.get("E", 0.0))
     return parameters.to_vector(stiffest | {BOARD_SUCTION: parameters[BOARD_SUCTION].prior_range[0]})

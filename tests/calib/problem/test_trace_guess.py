@@ -93,24 +93,34 @@ def test_the_guess_of_a_fast_cut_is_at_the_reference_speed() -> None:
 
 
 @pytest.mark.parametrize(("names", "seen"), [(NAMES, 2), (("E", "R", "mu"), 1)])
-def test_a_search_begins_at_little_friction_too(names: tuple[str, ...], seen: int) -> None:
-    """The usual food with a third of its friction comes first; the usual one where the trace says nothing."""
+def test_a_search_begins_at_a_stiff_food_that_hardly_rubs_too(names: tuple[str, ...], seen: int) -> None:
+    """It comes first, with a fifteenth of the friction and one sd stiffer; the usual one where the trace says nothing."""
     parameters = fit_parameters(APPLE, names)
     first, *others = (parameters.to_dict(z) for z in trace_guesses(SCENE, parameters, STROKE, made(), 0.1))
     usual = {p.name: p.value for p in parameters}
-    assert first == pytest.approx(usual | {"mu": FRICTION_PART * usual["mu"]})
+    stiffer = float(np.exp(parameters["E"].prior_sd))
+    changed = {name: stiffer * usual[name] for name in ("E", "yield_stress") if name in names}
+    assert first == pytest.approx(usual | changed | {"mu": usual["mu"] / 15})
     assert len(others) == seen
     if seen == 1:
         assert others[0] == pytest.approx(usual)
 
 
 def test_a_search_begins_on_a_board_that_hardly_holds_the_food_too() -> None:
-    """Where the suction is fitted, the stiffest start once more, with the suction at the low end of its prior."""
+    """Where the suction is fitted, the stiffest food of the trace once more, with the suction at its prior's low end."""
     parameters = fit_parameters(APPLE, (*NAMES, BOARD_SUCTION))
-    first, loose, *others = (parameters.to_dict(z) for z in trace_guesses(SCENE, parameters, STROKE, made(), 0.1))
-    stiffest = max((first, *others), key=lambda one: one["E"])
+    _, loose, *others = (parameters.to_dict(z) for z in trace_guesses(SCENE, parameters, STROKE, made(), 0.1))
+    stiffest = max(others, key=lambda one: one["E"])
     assert loose == pytest.approx(stiffest | {BOARD_SUCTION: APPLE.properties[BOARD_SUCTION].low})
     assert loose[BOARD_SUCTION] < 0.1 * stiffest[BOARD_SUCTION]
+
+
+def test_the_usual_food_is_hardly_held_where_the_trace_says_nothing() -> None:
+    """With a third of its friction."""
+    parameters = fit_parameters(APPLE, ("E", "R", "mu", BOARD_SUCTION))
+    _, loose, usual = (parameters.to_dict(z) for z in trace_guesses(SCENE, parameters, STROKE, made(), 0.1))
+    low = {BOARD_SUCTION: APPLE.properties[BOARD_SUCTION].low}
+    assert loose == pytest.approx(usual | low | {"mu": FRICTION_PART * usual["mu"]})
 
 
 def test_a_search_begins_at_the_usual_food_where_no_friction_is_fitted() -> None:
