@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 DATA_FRAME = "DataFrame"
 """What a trace from a DataFrame is called that says nothing else."""
-_KINDS = {
+_KINDS: Mapping[str, tuple[tuple[type, ...], str]] = {
     **dict.fromkeys(("source", "sha256", "label", "row"), TEXT),
     **dict.fromkeys(("start", "time_sd"), NUMBER),
     **dict.fromkeys(("notes", "breaks"), ((tuple, list), "a tuple")),
