@@ -11,10 +11,11 @@ from typing import Any
 
 import pandas as pd
 
-from calib.arguments import FLAG, KINDS, LIMITS, as_number, check_kind, listeners
+from calib.arguments import KINDS, LIMITS, as_number, listeners
 from calib.calibration.result import SUMMARY, read_result, read_summary
 from calib.calibration.result import CalibrationResult as CalibrationResult
 from calib.errors import OutputError
+from calib.io.kinds import FILE, FLAG, FOLDER, check_kind
 from calib.io.progress import Progress
 from calib.io.wording import as_arguments, brief, in_arguments, speaking_of_arguments
 from calib.material.food import FoodSpec
@@ -211,7 +212,11 @@ class Calibration:
 
         Args:
             out: Output folder, for the command that the summary states.
+
+        Raises:
+            CutcalError: It is no path.
         """
+        check_kind("Calibration.request", "out", out, *FOLDER)
         trace, air = self._records
         discrepancy = self._number("discrepancy")
         return Request(
@@ -265,6 +270,7 @@ class Calibration:
         """
         from calib.calibration.run import run
 
+        check_kind("Calibration.run", "out", "" if out is None else out, *FOLDER)
         request = self.request("" if out is None else out)
         folder = Path(f"cutcal-{request.food.name}-{request.stem}" if out is None else out)
         with speaking_of_arguments(), script_hidden(), ExitStack() as shown:
@@ -288,6 +294,7 @@ class Calibration:
         """
         from calib.calibration.description import description
 
+        check_kind("Calibration.check", "png", "" if png is None else png, *FILE)
         with speaking_of_arguments():
             return as_arguments(description(self.request(), None if png is None else Path(png)))
 
@@ -296,8 +303,10 @@ class Calibration:
         """The result in a folder that :meth:`run` or ``calibrate --out`` has written.
 
         Raises:
+            CutcalError: It is no path.
             OutputError: There is no finished calibration in it.
         """
+        check_kind("Calibration.load", "out", out, *FOLDER)
         folder = Path(out)
         path = folder / SUMMARY
         if not path.is_file():

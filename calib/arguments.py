@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from numbers import Real
 from pathlib import Path
-from typing import Any
 
+from calib.io.kinds import FILE, FLAG, FOLDER, NAMED, TEXT
 from calib.io.progress import Progress, ProgressBar
 from calib.io.wording import quoted
 from calib.material.food import FoodSpec
@@ -34,16 +34,14 @@ PLAIN = ("at", "budget")
 """Those of them that are numbers alone; the others may be text with a unit, such as ``45mm``."""
 _OF_TEXT = {"": "-", "Hz": "/s"}
 """How a unit of ``LIMITS`` is called where numbers are read from text, where it differs."""
-FLAG = ((bool,), "True or False")
-_TEXT, _FOLDER = ((str,), "text"), ((str, Path), "the path of a folder")
 KINDS: Mapping[str, tuple[tuple[type, ...], str]] = {
     "food": ((str, Path, FoodSpec), "a name, a YAML file or a Food"),
-    "knife": ((str, Path), "a name or a YAML file"),
-    "outline": ((str, Path), "the path of a file"),
+    "knife": NAMED,
+    "outline": FILE,
     **dict.fromkeys(("sample", "withdrawal"), FLAG),
-    **dict.fromkeys(("shape", "scale", "outline_as", "scheduler"), _TEXT),
-    **dict.fromkeys(("time_col", "force_col", "position_col", "depth_col", "decimal"), _TEXT),
-    **dict.fromkeys(("u_num", "start_from"), _FOLDER),
+    **dict.fromkeys(("shape", "scale", "outline_as", "scheduler"), TEXT),
+    **dict.fromkeys(("time_col", "force_col", "position_col", "depth_col", "decimal"), TEXT),
+    **dict.fromkeys(("u_num", "start_from"), FOLDER),
     "sign": ((str, Real), "'+' or '-'"),
     "rate": ((Real,), "the rows a second"),
     "set": ((Mapping,), "a dict such as {'E': 2e5}"),
@@ -53,30 +51,13 @@ KINDS: Mapping[str, tuple[tuple[type, ...], str]] = {
 """What arguments of a calibration may be, and in words; None where that is the default."""
 
 
-def check_kind(call: str, name: str, value: Any, kinds: tuple[type, ...], give: str) -> None:
-    """Insist on a kind of value.
-
-    Args:
-        call: What it is an argument of, such as ``Calibration``.
-        name: Its name.
-        value: What was given.
-        kinds: What it may be.
-        give: The same in words.
-
-    Raises:
-        CutcalError: It is something else.
-    """
-    if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
-        raise CutcalError(f"{call}: {name} = {quoted(value)}; give {give}")
-
-
 def as_number(call: str, name: str, value: float | str | None) -> float | None:
     """A number between its limits, from a number or from text with a unit.
 
     Args:
         call: What it is an argument of.
         name: Its name, one of ``LIMITS``.
-        value: The number [the unit of its limits], text such as ``45mm``, or None.
+        value: The number [the unit of its limits], text such as ``45mm``, or None. Those of ``PLAIN`` are numbers.
 
     Returns:
         The number, or None.
@@ -90,7 +71,7 @@ def as_number(call: str, name: str, value: float | str | None) -> float | None:
             value = si_number(value, _OF_TEXT.get(unit, unit))
         except ValueError as error:
             raise CutcalError(f"{call}: {name}: {error}") from None
-    if value is not None:
+    if value is not None or name in PLAIN:
         check_number(call, name, value, low, high, unit)  # type: ignore[arg-type]
     return value  # type: ignore[return-value]
 

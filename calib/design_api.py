@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from calib.api import script_hidden, workers_for
+from calib.arguments import KINDS, listeners
 from calib.calibration.result import CalibrationResult
 from calib.design.result import ALL
 from calib.design.result import DesignResult as DesignResult
 from calib.design.start import Start, start_of_food, start_of_run
+from calib.io.kinds import FLAG, FOLDER, NAMED, check_kind
 from calib.io.wording import brief, in_arguments, speaking_of_arguments
 from calib.material.food import FILES, FoodSpec
 from calib.material.knife import load_knife
@@ -76,6 +79,9 @@ class Design:
         Raises:
             CutcalError: There is one.
         """
+        for name in ("knife", "set", "scheduler"):
+            if (given := getattr(self, name)) is not None:
+                check_kind("Design", name, given, *KINDS[name])
         for name, lowest in (("draws", 1), ("workers", 1), ("seed", 0)):
             value = getattr(self, name)
             if name == "workers" and value is None:
@@ -90,6 +96,11 @@ class Design:
             raise CutcalError(f"Design: start = {brief(self.start)}; give a calibration's result or folder, or a food")
         if isinstance(self.blade, (str, Path)):
             raise CutcalError(f"Design: blade = {brief(str(self.blade))} is text; give a list, such as ['edc']")
+        if self.blade is not None:
+            check_kind("Design", "blade", self.blade, (Sequence,), "a list, such as ['edc']")
+            for blade in self.blade:
+                check_kind("Design", "a blade", blade, *NAMED)
+        check_kind("Design", "minutes", {} if self.minutes is None else self.minutes, (Mapping,), "a dict by kind")
         for name, value in (self.minutes or {}).items():
             check_number("Design", f"minutes of {brief(name)}", value, *MINUTES)
 
@@ -140,6 +151,9 @@ class Design:
         """
         from calib.design.run import DesignRequest, run
 
+        check_kind("Design.run", "out", "" if out is None else out, *FOLDER)
+        check_kind("Design.run", "resume", resume, *FLAG)
+        listeners("Design.run", None, say, ExitStack())
         folder = Path(f"cutcal-design-{self._start.food.name}" if out is None else out)
         say = in_arguments(say) or (lambda _: None)
         with (

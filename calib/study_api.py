@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from calib.api import Calibration, script_hidden, workers_for
-from calib.arguments import FLAG, LIMITS, check_kind, listeners
+from calib.arguments import LIMITS, listeners
 from calib.calibration.run_folder import RunFolder
 from calib.io.folder import finite
+from calib.io.kinds import FILE, FLAG, FOLDER, TEXT, check_kind
 from calib.io.progress import Progress
 from calib.io.typed_document import to_document
 from calib.io.wide_table import WideTable, table_of_rows
@@ -67,11 +68,21 @@ class Study:
         spec: What the file of the study says.
         call: How it was made, for the command that the summary states.
         folder: Output folder where :meth:`run` is given none.
+
+    Raises:
+        CutcalError: Something of a wrong kind.
     """
 
     spec: StudySpec
     call: str = field(default="Study", repr=False)
     folder: str = field(default="", repr=False)
+
+    def __post_init__(self) -> None:
+        from calib.multi_specimen.spec import StudySpec
+
+        check_kind("Study", "spec", self.spec, (StudySpec,), "what Study.read reads of a file")
+        for name in ("call", "folder"):
+            check_kind("Study", name, getattr(self, name), *TEXT)
 
     @staticmethod
     def read(path: str | Path) -> Study:
@@ -82,6 +93,7 @@ class Study:
         """
         from calib.multi_specimen.study_file import read_study
 
+        check_kind("Study.read", "path", path, *FILE)
         with speaking_of_arguments():
             return Study(read_study(path), f"Study.read({str(path)!r})", f"cutcal-{Path(path).stem}")
 
@@ -94,6 +106,7 @@ class Study:
         """
         from calib.multi_specimen.spec import study_of_cuts
 
+        check_kind("Study.of_cuts", "calibration", calibration, (Calibration,), "a Calibration")
         with speaking_of_arguments():
             of_one = next((name for name in FOR_ONE_CUT if getattr(calibration, name)), None)
             if of_one is not None:
@@ -107,10 +120,12 @@ class Study:
         """The finished study in a folder that :meth:`run` or ``calibrate --config`` has written.
 
         Raises:
+            CutcalError: It is no path.
             DocumentError: There is no finished study in it.
         """
         from calib.multi_specimen.result import read_result
 
+        check_kind("Study.load", "out", out, *FOLDER)
         return StudyRun(Path(out), read_result(Path(out)))
 
     def run(
@@ -146,6 +161,8 @@ class Study:
         """
         from calib.multi_specimen.run import run
 
+        check_kind("Study.run", "out", "" if out is None else out, *FOLDER)
+        check_kind("Study.run", "scheduler", "" if scheduler is None else scheduler, *TEXT)
         call = ", ".join(
             ([] if out is None else [repr(str(out))])
             + [f"{name}={value!r}" for name, value in (("budget", budget), ("arch", arch)) if value is not None]

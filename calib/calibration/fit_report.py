@@ -9,7 +9,7 @@ from typing import Protocol
 from calib.calibration.result_parts import Agreement, Posterior, SearchHistory, TraceSource
 from calib.uncertainty.estimates import FittedParameter
 from calib.validation.acceptance import Verdict, identified_words
-from calib.validation.bounds import told
+from mpm.output.verdict_words import verdict_word
 
 STRONG = 0.1
 """Correlations below this are left out of the text."""
@@ -76,7 +76,7 @@ def fit_report(result: Reported) -> str:
     for name, p in result.fitted.items():
         interval, prior = _range(p.low95, p.high95), _range(p.prior_low, p.prior_high)
         value = f"{p.value:.4g} {p.unit}"
-        lines.append(f"    {name + ':':19s}{value:16s}{interval:24s}{prior:24s}{told(p.verdict)}".rstrip())
+        lines.append(f"    {name + ':':19s}{value:16s}{interval:24s}{prior:24s}{verdict_word(p.verdict)}".rstrip())
     lines.append(f"[[Correlations]] below {STRONG:g} left out")
     lines += [f"    C({pair.replace(',', ', ')}) = {c:+.3f}" for pair, c in strongest(result.posterior.correlations)]
     return "\n".join(lines)
@@ -101,7 +101,7 @@ def html_table(result: Reported) -> str:
     rows = [
         "".join(
             f"<td>{escape(cell)}</td>"
-            for cell in (name, f"{p.value:.4g}", p.unit, _range(p.low95, p.high95), told(p.verdict))
+            for cell in (name, f"{p.value:.4g}", p.unit, _range(p.low95, p.high95), verdict_word(p.verdict))
         )
         for name, p in result.fitted.items()
     ]

@@ -268,7 +268,7 @@ def check_keys(
     known = list(dict.fromkeys([*required, *optional]))
     for key in given:
         if key not in known:
-            raise place.at(key).error(f"unknown key{suggest(key, known, synonyms)}")
+            raise place.at(str(key)).error(f"unknown key{suggest(str(key), known, synonyms)}")
     missing = [key for key in required if key not in given]
     if missing:
         raise place.error(f"misses {', '.join(missing)}; add {'it' if len(missing) == 1 else 'them'}")

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from calib.errors import MaterialError
+from calib.io.kinds import FILE, NAMED, TEXT, check_kind
 from calib.io.wording import listed
 from calib.io.yaml_checks import Place, check_keys, choice, data_path, mapping, read_yaml, suggest, text
 from calib.material.food_file import dump_material
@@ -37,6 +38,7 @@ from calib.material.properties import (
     read_property,
     rule_of,
 )
+from calib.material.together import BY_NAME, STRENGTHS, check_parts, check_together
 from mpm.scene.profiles import BARRELS, FAMILY
 from mpm.scene.shapes import SHAPE_KINDS
 
@@ -48,10 +50,9 @@ __all__ = ["FoodSpec", "Property", "Source", "check_override", "load_food", "loa
 
 FILES = (".yaml", ".yml")
 """How the name of a food's file ends."""
-_STRENGTHS = ("strength_ratio", "tensile_strength")  # a food has one of them at most
 _LAYERS = (*LAYERS, *LAYERS.values(), *LAYER_STIFFNESS.values())
 _OPTIONAL = (*_LAYERS, "skin_stiffness", *BOARD, *ADHESION, *RELAXATION, RELAXING_BULK, RATE_EXPONENT,
-             *_STRENGTHS)  # fmt: skip
+             *STRENGTHS)  # fmt: skip
 _NULLABLE = ("R_skin", "fracture_energy", *_OPTIONAL)  # a file may leave the optional ones out
 
 Sentences: TypeAlias = list[str]
@@ -74,6 +75,7 @@ class FoodSpec:
             is asked for them (:func:`calib.material.inclusions.with_inclusions`).
 
     Raises:
+        CutcalError: A part of a wrong kind.
         MaterialError: Unknown shape, a missing property, or a skin without resistance.
     """
 
@@ -87,6 +89,7 @@ class FoodSpec:
     roundness: Property | None = None
 
     def __post_init__(self) -> None:
+        check_parts(vars(self))
         here = Place("", (self.name,))
         choice(here.at("shape").at("kind"), self.shape_kind, SHAPE_KINDS)
         check_keys(here.at("shape"), self.dims, DIMENSIONS)
@@ -97,20 +100,7 @@ class FoodSpec:
             raise here.at("shape").error(f"a {self.shape_kind} has no roundness; {listed(list(FAMILY))} have one")
         needed = [p for p in PROPERTIES if p not in _NULLABLE]
         check_keys(here.at("properties"), self.properties, needed, _NULLABLE, SYNONYMS)
-        if self.properties["skin_thickness"].value > 0.0 and "R_skin" not in self.properties:
-            raise here.at("properties").error("skin_thickness > 0 needs R_skin; give it, or skin_thickness 0")
-        if all(name in self.properties for name in _STRENGTHS):
-            raise here.at("properties").error("strength_ratio and tensile_strength are the same; give one of them")
-        for size, resistance in (*LAYERS.items(), ADHESION, RELAXATION):
-            have = [name for name in (size, resistance) if name in self.properties]
-            if len(have) == 1:
-                other = resistance if have[0] == size else size
-                raise here.at("properties").error(f"{have[0]} needs {other}; give both, or neither")
-        if RELAXING_BULK in self.properties and "relaxing_share" not in self.properties:
-            raise here.at("properties").error(f"{RELAXING_BULK} is a part of relaxing_share; give that too")
-        for size, stiffness in LAYER_STIFFNESS.items():
-            if stiffness in self.properties and size not in self.properties:
-                raise here.at("properties").error(f"{stiffness} needs {size}; give it, and {LAYERS[size]}")
+        check_together(here, self.properties)
 
     def __repr__(self) -> str:
         size = " x ".join(f"{1e3 * self.dims[name].value:.3g}" for name in DIMENSIONS)
@@ -140,8 +130,10 @@ class FoodSpec:
         """Write the food to a ``.yaml`` file, which :meth:`load` reads back.
 
         Raises:
+            CutcalError: It is no path.
             OutputError: The file cannot be written.
         """
+        check_kind("Food.save", "path", path, *FILE)
         dump_material(self, path, self.calibration or {})
 
     @classmethod
@@ -149,8 +141,10 @@ class FoodSpec:
         """A food by its name in ``materials.yaml``, or from the YAML file of one food, as a calibration writes it.
 
         Raises:
+            CutcalError: It is neither a name nor a path.
             MaterialError: There is no such food, or something is wrong with the file.
         """
+        check_kind("Food.load", "name", name, *NAMED)
         if isinstance(name, Path) or str(name).endswith(FILES):
             return load_material_file(name)
         return load_food(name)
@@ -159,7 +153,7 @@ class FoodSpec:
     def default_fit(self) -> tuple[str, ...]:
         """Names of the properties that a calibration fits unless told otherwise."""
         start = ("R_skin", "skin_thickness") if self.properties["skin_thickness"].value > 0.0 else ("R_initiation",)
-        strength = tuple(name for name in _STRENGTHS if name in self.properties)
+        strength = tuple(name for name in STRENGTHS if name in self.properties)
         board = tuple(name for name in BOARD if self.value(name))
         return ("E", "yield_stress", *strength, "R", *self.layers, *start, "initiation_depth", "mu", *board)
 
@@ -205,8 +199,11 @@ class FoodSpec:
             The food.
 
         Raises:
-            MaterialError: An impossible size.
+            CutcalError: No dict was given.
+            MaterialError: An unknown or impossible size.
         """
+        check_kind("Food.with_sizes", "sizes", sizes, *BY_NAME)
+        check_keys(Place("", (self.name, "shape")), sizes, (), DIMENSIONS)
         new = dict(self.dims)
         for name, x in sizes.items():
             new[name] = replace(new[name], value=x, status=status, source=source)
@@ -227,13 +224,15 @@ class FoodSpec:
             ``strength_ratio`` and ``tensile_strength`` takes the place of the other.
 
         Raises:
+            CutcalError: No dict was given.
             MaterialError: An unknown property, or a value out of its limits.
         """
+        check_kind("Food.with_values", "values", values, *BY_NAME)
         new = dict(self.properties)
         for name, raw in values.items():
             x = check_override(name, raw)
-            if name in _STRENGTHS:
-                new.pop(_STRENGTHS[1 - _STRENGTHS.index(name)], None)
+            if name in STRENGTHS:
+                new.pop(STRENGTHS[1 - STRENGTHS.index(name)], None)
             old = new.get(name)
             if old is None:
                 new[name] = Property(name, x, *given_range(name, x), PROPERTIES[name].unit, source, status)
@@ -263,7 +262,7 @@ class FoodSpec:
     @property
     def _lacks_strength(self) -> bool:
         """Whether bulk damage has its energy, but not the stress at which it starts."""
-        return "fracture_energy" in self.properties and not set(_STRENGTHS) & set(self.properties)
+        return "fracture_energy" in self.properties and not set(STRENGTHS) & set(self.properties)
 
     @property
     def rate_dependent(self) -> bool:
@@ -292,8 +291,10 @@ class FoodSpec:
             The food; bulk damage is left out where there is no tensile strength at which it starts.
 
         Raises:
+            CutcalError: A shape that is no text.
             SceneError: A shape or size that the solver cannot take.
         """
+        check_kind("Food.to_scene_food", "shape", self.shape_kind if shape is None else shape, *TEXT)
         from mpm.scene import Food
         from mpm.scene.material import Material
         from mpm.scene.shapes import Shape, named

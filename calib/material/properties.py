@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from calib.errors import MaterialError
+from calib.io.kinds import check_kind
 from calib.io.wording import quoted
 from calib.io.yaml_checks import Place, check_keys, check_unit, choice, finite_number, mapping, suggest, text
 from calib.table.si_numbers import si_number
@@ -313,8 +314,10 @@ def rule_of(name: str, rules: Mapping[str, Rule] = PROPERTIES) -> Rule:
     """Unit and limits of a property.
 
     Raises:
+        CutcalError: The name is no text.
         MaterialError: There is no property of that name (with the nearest one).
     """
+    check_kind("a property", "name", name, (str,), "text, such as 'E'")
     if name not in rules:
         raise MaterialError(f"unknown property {name!r}{suggest(name, rules, SYNONYMS)}")
     return rules[name]

@@ -171,7 +171,19 @@ class _OwnFit:
 
 
 def _own_fit(specimens: Specimens, shared: Mapping[str, float], name: str) -> _OwnFit | None:
-    """The specimen's own values with the flesh held; None where it has none."""
+    """The specimen's own values, fitted with the flesh held.
+
+    Args:
+        specimens: The study's specimens.
+        shared: The flesh that is held [SI], by name.
+        name: The specimen.
+
+    Returns:
+        The fit; None where the specimen has no values of its own.
+
+    Raises:
+        KeyboardInterrupt: The search was interrupted.
+    """
     setup, chosen = specimens.setups[name], specimens.own_parameters(name, shared)
     if not chosen:
         return None
@@ -204,6 +216,16 @@ def _adapted(
     """The specimen's own values for each of some other materials, with what their fit does not know of them.
 
     A run that breaks down on coarse cells says nothing: the best values stay.
+
+    Args:
+        specimens: The study's specimens.
+        own: The fit of the specimen's own values; None where it has none.
+        shared: The flesh with which they were fitted [SI], by name.
+        others: Other materials [SI], by name.
+        name: The specimen.
+
+    Returns:
+        Its own values for each of the other materials [SI], by name.
     """
     if own is None:
         return [{}] * len(others)
@@ -229,6 +251,14 @@ def _adapted(
 def _simulated(specimens: Specimens, name: str, batch: list[dict[str, float]]) -> list[Evaluation]:
     """Simulations of a trace's cut in the order of their values, of which the first has ended its stroke.
 
+    Args:
+        specimens: The study's specimens.
+        name: The trace.
+        batch: Values of each simulation [SI], by name.
+
+    Returns:
+        The simulations.
+
     Raises:
         SimulationError: It has not.
     """
@@ -248,6 +278,15 @@ def _drawn(fit: JointFit, knife: str, scatter: float, seed: int) -> list[dict[st
     """Flesh of another specimen: materials from the posterior of a fit, each moved by the scatter.
 
     The fitted flesh is the mean of n specimens, from which another one differs by a variance of 1 + 1/n of theirs.
+
+    Args:
+        fit: The fit.
+        knife: The knife that cuts the other specimen.
+        scatter: Standard deviation of the logarithm of a value among specimens [-].
+        seed: Seed of the draws.
+
+    Returns:
+        The materials [SI], by name; none where the fit ended too early for a posterior.
     """
     if fit.analysis is None or fit.result.surrogate is None:
         return []
@@ -262,7 +301,16 @@ def _drawn(fit: JointFit, knife: str, scatter: float, seed: int) -> list[dict[st
 
 
 def _mean_curve(specimens: Specimens, names: tuple[str, ...], held: str) -> FloatArray:
-    """Mean of the other traces' curves over their own peaks and strokes, scaled to the held-out one [N] (n,)."""
+    """Mean of the other traces' curves over their own peaks and strokes, scaled to the held-out one.
+
+    Args:
+        specimens: The study's specimens.
+        names: The other traces.
+        held: The trace that is held out.
+
+    Returns:
+        The curve [N], shape (n,).
+    """
     curves = [specimens.setups[n].curve.curve for n in names]
     mean = np.mean([c / c.max() for c in curves], axis=0)
     real = specimens.setups[held].curve.curve
@@ -271,7 +319,17 @@ def _mean_curve(specimens: Specimens, names: tuple[str, ...], held: str) -> Floa
 
 
 def _band(objective: Objective, curves: Sequence[FloatArray], fit: JointFit, seed: int) -> Band:
-    """Band of the simulated curves, each with its own factor, and of errors as the fit showed them."""
+    """Band of the simulated curves, each with its own factor, and of errors as the fit showed them.
+
+    Args:
+        objective: The objective of the held-out trace.
+        curves: Simulated forces [N], each of shape (n,).
+        fit: The fit that shows the errors.
+        seed: Seed of the errors.
+
+    Returns:
+        The band.
+    """
     random = np.random.default_rng(seed)
     found = None if fit.analysis is None else fit.analysis.uncertainty
     size = 1.0 if found is None else float(np.sqrt(found.error_variance))

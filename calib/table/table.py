@@ -70,12 +70,13 @@ def rows_at(rows: Sequence[Any], on: Sequence[int] | np.ndarray) -> Sequence[Any
 
     Args:
         rows: What it calls each row, n of them.
-        on: Indices of those that are wanted, increasing, shape (m,) [-].
+        on: Indices of those that are wanted, in the order that is wanted, shape (m,) [-].
 
     Returns:
         Their names, m of them.
     """
-    return rows if len(on) == len(rows) else [rows[i] for i in on]
+    whole = len(on) == len(rows) and bool(np.all(np.diff(on) > 0))
+    return rows if whole else [rows[i] for i in on]
 
 
 def as_float(cell: Any) -> float | None:

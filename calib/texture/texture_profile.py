@@ -16,6 +16,7 @@ from calib.errors import TraceError
 from calib.io.type_schema import NumberOrNull, Positive
 from calib.texture.bites import Bite, find_bites
 from calib.texture.plate_record import PlateRecord
+from mpm.arrays import FloatArray
 
 RUN_ON = 0.02
 """Part of the depth by which the recorded way may go on behind the peak of the load [-]: a plate whose way is recorded
@@ -127,6 +128,21 @@ def texture_profile(record: PlateRecord, trigger: float | None = None) -> tuple[
     return profile, _remarks(record, first, second)
 
 
+def _times(record: PlateRecord, start: float, end: float) -> FloatArray:
+    """Two times, and those of the samples between them.
+
+    Args:
+        record: The record.
+        start: The first time [s].
+        end: The last time [s].
+
+    Returns:
+        The times [s], increasing, shape (n,).
+    """
+    inside = record.time[(record.time > start) & (record.time < end)]
+    return np.concatenate([[start], inside, [end]])
+
+
 def area(record: PlateRecord, start: float, end: float) -> float:
     """Integral of the load over time between two times [N s].
 
@@ -138,8 +154,7 @@ def area(record: PlateRecord, start: float, end: float) -> float:
     Returns:
         The integral of the line through the samples.
     """
-    inside = record.time[(record.time > start) & (record.time < end)]
-    time = np.concatenate([[start], inside, [end]])
+    time = _times(record, start, end)
     return float(np.trapezoid(np.interp(time, record.time, record.load), time))
 
 
@@ -154,8 +169,7 @@ def work(record: PlateRecord, start: float, end: float) -> float:
     Returns:
         The integral of the line through the samples.
     """
-    inside = record.time[(record.time > start) & (record.time < end)]
-    time = np.concatenate([[start], inside, [end]])
+    time = _times(record, start, end)
     load, way = (np.interp(time, record.time, values) for values in (record.load, record.way))
     return float(np.trapezoid(load, way))
 

@@ -134,7 +134,7 @@ def _not_there(trace: Trace, i: int, steps: np.ndarray) -> str:
     names = trace.rows[i : i + 2] if trace.rows else ()
     if len(names) == 2 and all(isinstance(name, Integral) for name in names):
         missing = round(float(steps[i]) / float(np.median(steps))) - 1
-        if int(names[1]) - int(names[0]) - 1 >= missing:
+        if abs(int(names[1]) - int(names[0])) - 1 >= missing:
             return "rows without a number (empty or nan) were written"
     return "no samples were written"
 

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from calib.errors import TraceError
+from calib.io.kinds import COLUMN, check_kind
 from calib.io.wording import LONG, brief, listed, quoted
 from calib.table.table import Table, rows_at
 from calib.trace.clock import running_clock
@@ -51,6 +52,7 @@ class Reading:
         decimal: The mark before decimals in a text file, ``.`` or ``,``; None to tell it from the numbers.
 
     Raises:
+        CutcalError: A name of a column that is no text.
         TraceError: A rate that is not positive, a mark that is none.
     """
 
@@ -63,6 +65,9 @@ class Reading:
     decimal: str | None = None
 
     def __post_init__(self) -> None:
+        for name in ("time_col", "force_col", "position_col", "depth_col"):
+            if (column := getattr(self, name)) is not None:
+                check_kind("record", name, column, *COLUMN)
         rate: Any = self.rate
         plain = isinstance(rate, Real) and not isinstance(rate, bool)
         if rate is not None and not (plain and np.isfinite(rate) and rate > 0.0):

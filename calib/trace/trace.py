@@ -12,6 +12,7 @@ import numpy as np
 
 from calib.errors import TraceError
 from calib.formats.reader import read_table
+from calib.io.kinds import FLAG, NUMBER, TEXT, check_kind
 from calib.io.wording import brief, quoted, speaking_of_arguments
 from calib.io.yaml_checks import suggest
 from calib.table.table import MEASURED, TRACE_LABELS, Table, rows_at
@@ -23,6 +24,15 @@ if TYPE_CHECKING:
 
 DATA_FRAME = "DataFrame"
 """What a trace from a DataFrame is called that says nothing else."""
+_KINDS: Mapping[str, tuple[tuple[type, ...], str]] = {
+    **dict.fromkeys(("source", "sha256", "label", "row"), TEXT),
+    **dict.fromkeys(("start", "time_sd"), NUMBER),
+    **dict.fromkeys(("notes", "breaks"), ((tuple, list), "a tuple")),
+    "columns": ((Mapping,), "a dict of names"),
+    "rows": ((Sequence, np.ndarray), "a list of names"),
+    "whole": FLAG,
+}
+"""What parts of a trace may be, and in words."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -46,6 +56,7 @@ class Trace:
         whole: Whether it is one cut, also where its force is released in it.
 
     Raises:
+        CutcalError: Something of a wrong kind.
         TraceError: Too few samples, unequal lengths, a number that is not finite, a clock that does not run.
     """
 
@@ -65,8 +76,10 @@ class Trace:
     whole: bool = False
 
     def __post_init__(self) -> None:
+        for name, kind in _KINDS.items():
+            check_kind("Trace", name, getattr(self, name), *kind)
         for name in ("time", "force", "position"):
-            if getattr(self, name) is not None:
+            if name != "position" or self.position is not None:
                 object.__setattr__(self, name, self._numbers(name))
         if self.label not in TRACE_LABELS:
             raise TraceError(f"{self.source}: label {quoted(self.label)} is not one of {', '.join(TRACE_LABELS)}")
@@ -103,8 +116,10 @@ class Trace:
         """The part up to a time [s].
 
         Raises:
+            CutcalError: It is no number.
             TraceError: A time outside the record, or too near to its beginning.
         """
+        check_kind("Trace.until", "end", end, *NUMBER)
         keep = self.time <= end
         if np.count_nonzero(keep) < MIN_SAMPLES or not end <= self.time[-1]:
             raise TraceError(
@@ -118,7 +133,11 @@ class Trace:
 
         Args:
             kept: Their indices, increasing, shape (m,).
+
+        Raises:
+            CutcalError: They are no indices.
         """
+        check_kind("Trace.part", "kept", kept, (np.ndarray, list), "an array of indices")
         return replace(
             self,
             time=self.time[kept],
@@ -170,8 +189,12 @@ class Trace:
             The trace in SI units.
 
         Raises:
+            CutcalError: Something of a wrong kind.
             TraceError: As :func:`read_trace`.
         """
+        for name, value in (("source", source), ("label", label)):
+            if value is not None:
+                check_kind("Trace.from_frame", name, value, *TEXT)
         import pandas
 
         from calib.formats.frame_table import table_of_frame

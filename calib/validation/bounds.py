@@ -9,15 +9,6 @@ from calib.uncertainty.estimates import FittedParameter
 # whereas one that ends on a bound of ours asks for a value that it was not allowed.
 NATURAL_LIMITS = {"mu": 0.0, "strength_ratio": 1.0}
 AT_BOUND, AT_LIMIT = "at_bound", "at_limit"
-TOLD = {
-    "one_sided": "one-sided",
-    "not_seen": "not seen",
-    "only_as_product": "only as a product",
-    AT_BOUND: "at its bound",
-    AT_LIMIT: "at its natural limit",
-    "unknown": "not determined",
-}
-"""Verdicts on a parameter that are written otherwise for a reader than in documents and tables."""
 
 
 def _at_natural_limit(name: str, p: FittedParameter) -> bool:
@@ -41,8 +32,3 @@ def bound_word(name: str, p: FittedParameter) -> str:
         :data:`AT_LIMIT` for :data:`AT_BOUND` at the end of what is possible, else the verdict as it is.
     """
     return AT_LIMIT if p.verdict == AT_BOUND and (name in FITTED_SIZES or _at_natural_limit(name, p)) else p.verdict
-
-
-def told(verdict: str) -> str:
-    """A verdict on a parameter in the words of the glossary."""
-    return TOLD.get(verdict, verdict)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from mpm.output.verdict_words import VERDICT_WORDS
 from reports.base.format import NBSP, breakable, count, listed, quantity
 
 #: Names of the files in words; what is not here loses its underscores.
@@ -12,14 +13,8 @@ WORDS = {
     "ramp": "straight ramp (1 number)",
     "half_sine": "half sine (1 number)",
     "three_term": "three-term curve (7 numbers)",
-    "weak": "weakly identified",
-    "one_sided": "one-sided",
-    "only_as_product": "only as a product",
-    "not_seen": "not seen",
-    "at_bound": "at its bound",
-    "at_limit": "at its natural limit",
-    "unknown": "not determined",
     "paper_table2": "paper, Table 2",
+    **VERDICT_WORDS,
 }
 #: Parts below which no number of per cent with two decimals is left.
 LEAST_PART = 5e-5

@@ -103,7 +103,8 @@ def sketch(result: CalibrationResult) -> bytes:
 
 
 def _symmetric(result: CalibrationResult) -> tuple[bool, bool]:
-    """Whether x = 0 and y = 0 are planes of symmetry."""
+    """Whether x = 0 and y = 0 are planes of symmetry; neither where nothing is recorded, as in a study without the
+    record of its cut."""
     images = result.cut.mirror_images
     return (images == 4, images in (2, 4))
 
@@ -264,9 +265,12 @@ def _conditions(result: CalibrationResult) -> list[list[str]]:
         ["E", f"board: rigid; the food lies on it free of stress{weight}"],
     ]
     symmetric = sum(_symmetric(result))
-    if symmetric:
+    images: int | None = cut.mirror_images
+    if images is None:
+        rows.append(["F", "planes of symmetry: not recorded, and not drawn"])
+    elif symmetric:
         planes = "plane of symmetry" if symmetric == 1 else "planes of symmetry"
-        rows.append(["F", f"{planes}: normal velocity zero, no friction; {cut.mirror_images} parts from one"])
+        rows.append(["F", f"{planes}: normal velocity zero, no friction; {images} parts from one"])
     return [*rows, ["G", "the grid, at its size; all other surfaces are free"]]
 
 

@@ -32,6 +32,7 @@ IDENTIFIABILITY = {
     "that draw the curve",
     "at_bound": "the fit ran into the end of what was allowed, and fails for it",
     "at_limit": "the best value is the end of what is possible, such as no friction: a result, no failure",
+    "unknown": "the fit ended before it was known how far the value may be off",
 }
 #: What the sensitivity is of, and the part of the variance from which on a parameter is named.
 QUANTITIES = {"peak": "peak", "work": "work", "initial_slope": "initial slope"}

@@ -116,7 +116,16 @@ def _of(name: str, s: Data) -> Data:
 
 
 def _cut(name: str, s: Data, columns: Mapping[str, np.ndarray]) -> list[str]:
-    """Name, specimen, knife, cells, particles, stroke, and both peaks of a cut."""
+    """A line of the table of all cuts.
+
+    Args:
+        name: The cut.
+        s: ``summary.json``.
+        columns: Columns of its curves, each (n,): stroke [m], forces [N].
+
+    Returns:
+        Name, specimen, knife, cells, particles, stroke, and both peaks.
+    """
     cut = _of(name, s)
     shape, knife, dx = cut.get("shape"), cut.get("knife"), cut.get("dx_m")
     particles = cut.get("particles", (cut.get("scalars") or {}).get("particles"))

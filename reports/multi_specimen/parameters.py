@@ -94,7 +94,17 @@ def priors(s: Data, known: Known) -> list[list[str]]:
 
 
 def _narrowed(source: str, unit: str, food: Data, tests: list[Data]) -> str:
-    """The source of a prior that is the literature's range and compression tests together."""
+    """The source of a prior that is the literature's range and compression tests together.
+
+    Args:
+        source: Where the literature's range is from.
+        unit: Unit of the property.
+        food: What the food's file says of the property; nothing where it cannot be read.
+        tests: The compression tests.
+
+    Returns:
+        The source in words.
+    """
     low, high = food.get("low"), food.get("high")
     ends = "" if low is None or high is None else f", {interval(low, high, unit)}"
     said = listed([f"{t['name']} ({_test(t)})" for t in tests])

@@ -291,7 +291,16 @@ def _caption(s: Data, name: str) -> str:
 
 
 def _title(name: str, s: Data, how: str) -> str:
-    """What a cut is called that is held out in one fit and fitted in another: with which of the two is meant."""
+    """What a cut is called, which may be held out in one fit and fitted in another.
+
+    Args:
+        name: The cut.
+        s: ``summary.json``.
+        how: Which of the two is meant, in words.
+
+    Returns:
+        Its name, with these words where it is both.
+    """
     return f"{name}, {how}" if name in s["hold_out"] and name in s["traces"] else name
 
 

@@ -104,7 +104,7 @@ def as_calibration(s: Data, name: str, known: Known, cited: Cited) -> Any:
         cut=SimpleNamespace(
             dx_m=cut["dx_m"],
             particles=int((cut.get("scalars") or {}).get("particles", 0)) or None,
-            mirror_images=1 if stored is None else stored.images,
+            mirror_images=None if stored is None else stored.images,
             mach=cut.get("mach"),
             speed_real_m_s=cut.get("speed_real_m_s"),
             shape=Shape(**cut["shape"]),

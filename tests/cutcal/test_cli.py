@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -12,9 +13,10 @@ import pytest
 from calib.calibration.result import read_result
 from calib.material.food import load_food, load_foods
 from calib.material.references import remarks
-from calib.validation.bounds import TOLD
 from cutcal.commands.calibration.calibrate import verdict_text
 from cutcal.main import main
+from mpm.output.verdict_words import VERDICT_WORDS
+from reports.calibration import parameter_page
 from tests.data_dir import ROOT
 from tests.reports.sample import summary, write_run
 
@@ -171,8 +173,24 @@ def test_the_terminal_says_verdicts_in_words(tmp_path):
     for text in (verdict_text(result), result.fit_report(), result._repr_html_()):
         assert "one-sided" in text and "only as a product" in text and "_sided" not in text and "as_product" not in text
     assert set(result.parameters["verdict"]) == codes
-    glossary = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
-    assert [words for words in TOLD.values() if f"| {words} |" not in glossary] == ["not determined"]
+
+
+def test_one_word_for_one_verdict(tmp_path):
+    """That of the terminal, of ``fit_report``, of the report with its legend, and of the documentation, for each
+    verdict that a document may have."""
+    result = read_result(write_run(tmp_path))
+    schema = json.loads((ROOT / "calib" / "io" / "schemas" / "common.json").read_text(encoding="utf-8"))
+    verdicts = schema["$defs"]["verdictWord"]["enum"]
+    assert set(VERDICT_WORDS) == set(verdicts)
+    docs = [(ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("glossary.md", "calibrate.md")]
+    for verdict in verdicts:
+        one = replace(result, fitted={"E": replace(result.fitted["E"], verdict=verdict)})
+        word = parameter_page.parameter("E", one.fitted["E"], "")["verdict"]
+        assert [row[0] for row in parameter_page.legend(one.fitted)] == [word]
+        assert re.search(rf"^ +E .*  {word}$", verdict_text(one), re.MULTILINE), word
+        assert re.search(rf"^ +E: .*  {word}$", one.fit_report(), re.MULTILINE), word
+        assert f"<td>{word}</td>" in one._repr_html_()
+        assert all(re.search(rf"^\| {word}( \(`{verdict}`\))? \|", text, re.MULTILINE) for text in docs), word
 
 
 def test_the_terminal_has_units_that_people_use(tmp_path):

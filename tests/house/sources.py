@@ -50,15 +50,21 @@ def imports(name: str, *, loading: bool = False) -> set[str]:
     return {one for one in out if one in modules() and one != name}
 
 
-def functions() -> Iterator[tuple[str, ast.FunctionDef, list[ast.arg]]]:
-    """Public functions and methods: place, syntax, and arguments without ``self``."""
+def functions(helpers: tuple[str, ...] = ()) -> Iterator[tuple[str, ast.FunctionDef, list[ast.arg]]]:
+    """Public functions and methods: place, syntax, and arguments without ``self``.
+
+    Args:
+        helpers: Packages and modules whose functions are wanted that are not public, in place of the public ones.
+    """
     for name, path in modules().items():
+        if helpers and not any(f"{name}.".startswith(f"{one}.") for one in helpers):
+            continue
         found: list[tuple[ast.AST, bool]] = [(node, False) for node in tree(path).body]
         while found:
             node, method = found.pop()
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 found += [(one, True) for one in node.body]
-            elif isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+            elif isinstance(node, ast.FunctionDef) and node.name.startswith("_") == bool(helpers):
                 arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
                 own = method and bool(arguments) and arguments[0].arg in ("self", "cls")
                 yield f"{name}.{node.name}", node, arguments[own:]

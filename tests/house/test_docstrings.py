@@ -11,6 +11,8 @@ from tests.house.sources import functions
 MANY = 3
 ARRAY = re.compile(r"ndarray|FloatArray|NDArray|ArrayLike")
 SHAPE, UNIT = re.compile(r"\(\w[^)]*\)|shape|scalar"), re.compile(r"\[[^\]]+\]")
+HELPERS = ("reports.multi_specimen", "calib.multi_specimen.held_out")
+"""Where functions that are not public say it too."""
 COMPILED = {"ti.func", "ti.kernel"}
 """Decorators of functions in Taichi's language: their arguments are said in words where the step is described."""
 
@@ -39,7 +41,7 @@ def missing(node: ast.FunctionDef, arguments: list[ast.arg]) -> list[str]:
 def test_public_functions_say_what_they_take_give_and_raise():
     """Each argument; shape and unit of arrays; what is returned; errors, where it raises any itself."""
     silent = {}
-    for name, node, arguments in functions():
+    for name, node, arguments in (*functions(), *functions(HELPERS)):
         if len(arguments) < MANY or COMPILED & {ast.unparse(one) for one in node.decorator_list}:
             continue
         if out := missing(node, arguments):

@@ -307,12 +307,12 @@ def study_text(result: StudyResult, out: Path) -> str:
 
 def _fitted(p: FittedParameter | StudyParameter) -> str:
     """Value, interval and verdict of a parameter, in the unit that people use for it."""
-    from calib.validation.bounds import told
+    from mpm.output.verdict_words import verdict_word
 
     factor, unit = terminal_rung(p.unit, abs(p.value))
     known = None if p.low95 is None or p.high95 is None else (p.low95 / factor, p.high95 / factor)
     interval = "" if known is None else f"{_end(known[0])} to {_end(known[1])}"
-    return f"{p.value / factor:>10.4g} {unit:6s}{interval:>24s}  {told(p.verdict)}"
+    return f"{p.value / factor:>10.4g} {unit:6s}{interval:>24s}  {verdict_word(p.verdict)}"
 
 
 def _end(x: float) -> str:

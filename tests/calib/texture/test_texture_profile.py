@@ -8,10 +8,19 @@ import pytest
 from calib.errors import TraceError
 from calib.texture.bites import moving_mean
 from calib.texture.plate_record import PlateColumns, read_record, read_records
-from calib.texture.texture_profile import texture_profile
+from calib.texture.texture_profile import area, texture_profile, work
 from tests.calib.texture.made_bites import DEPTH, HEIGHT, record, two_bites, write
 
 PLAIN = PlateColumns()
+
+
+@pytest.mark.parametrize(("start", "end"), [(0.5, 2.5), (1.0, 3.0), (1.2, 1.7)])
+def test_integrals_reach_from_one_time_to_the_other(start, end):
+    """A load that grows with time, and a way that grows twice as fast: both ends count, between samples and on them."""
+    time = np.arange(5.0)
+    grows = record(time, 2.0 * time, time)
+    exact = 0.5 * (end**2 - start**2)
+    assert (area(grows, start, end), work(grows, start, end)) == pytest.approx((exact, 2.0 * exact))
 
 
 @pytest.mark.parametrize("power", [1.0, 2.5])

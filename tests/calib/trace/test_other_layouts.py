@@ -6,6 +6,7 @@ import bz2
 import gzip
 import io
 import lzma
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -337,11 +338,20 @@ def test_a_record_from_its_end_may_have_other_faults(tmp_path: Path, fault: str)
     is_the_cut(trace)
 
 
+@pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize(("word", "there"), [("nan", True), ("", True), ("left out", False)])
-def test_rows_without_a_number_are_told_from_rows_that_are_not_there(tmp_path: Path, word: str, there: bool) -> None:
-    """A gap that is bridged: in the file are rows with nan or nothing in them, or none."""
+def test_rows_without_a_number_are_told_from_rows_that_are_not_there(
+    tmp_path: Path, word: str, there: bool, turned: bool
+) -> None:
+    """A gap that is bridged: in the file are rows with nan or nothing in them, or none, also where the file begins with
+    the last sample; the rows beside it are named as the file counts them."""
     cells = plain_rows(CUT)
     cells[300:306] = [(row[0], word, row[2]) for row in cells[300:306]] if there else []
+    last = len(cells)
+    cells = cells[::-1] if turned else cells
     said = [note for note in condition(read(tmp_path, text_of(HEADER, cells))).warnings if "a line bridges it" in note]
     what = "rows without a number (empty or nan) were written" if there else "no samples were written"
     assert len(said) == 1 and f": {what} for " in said[0]
+    beside = [299, 306 if there else 300]
+    numbers = [last - 1 - i if turned else i for i in beside]
+    assert re.findall(r"row (\d+) \(", said[0]) == [str(2 + number) for number in numbers]

@@ -251,7 +251,7 @@ def test_units_in_sentences_of_a_run_are_typeset(content: Content) -> None:
 def test_verdicts_that_occur_are_explained(content: Content) -> None:
     """Each verdict in the table has one explanation, in words, and no other is explained."""
     words = [w for w, _ in content()["legend"]]
-    assert words == ["identified", "weakly identified", "one-sided", "only as a product"]
+    assert words == ["identified", "weak", "one-sided", "only as a product"]
     assert {p["verdict"] for p in content()["parameters"]} == set(words)
 
 

@@ -54,16 +54,23 @@ def test_the_model_is_said_as_in_a_calibration(tmp_path: Path) -> None:
     laws = {part: spaced(law) for part, law, _ in w["laws"]}
     assert laws["Board"] == "contact without adhesion, Coulomb friction 0.500"
     assert "24.8 kPa" in laws["Crack"]  # 0.8 of the fitted yield stress
-    assert [letter for letter, _ in w["conditions"]] == ["A", "B", "C", "D", "E", "G"]
+    assert [letter for letter, _ in w["conditions"]] == ["A", "B", "C", "D", "E", "F", "G"]
+    assert w["conditions"][5][1] == "planes of symmetry: not recorded, and not drawn"
     blade = spaced(w["conditions"][0][1])
     assert "0.0100 of the speed of pressure waves in the food, 260 mm/s, where the trace has 20 mm/s" in blade
     with h5py.File(run / "record-first.h5", "w") as file:
         file.attrs.update(images=4, dt=8.2e-5, steps=1406)
     four = content(read_study(run, MEANINGS, cited))["model"]["conditions"]
-    assert four[5][0] == "F" and four[5][1].startswith("planes of symmetry")
+    assert four[5][0] == "F" and four[5][1].startswith("planes of symmetry: normal velocity zero")
+    with h5py.File(run / "record-first.h5", "a") as file:
+        file.attrs["images"] = 1
+    whole = content(read_study(run, MEANINGS, cited))["model"]["conditions"]
+    assert [letter for letter, _ in whole] == ["A", "B", "C", "D", "E", "G"]
+    (run / "record-first.h5").unlink()
     found = words(run)
     for said in (
         "faces of the blade: contact and friction",
+        "planes of symmetry: not recorded",
         "Words and abbreviations",
         "Kind of source",
         "proxy, another food",
