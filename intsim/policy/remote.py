@@ -99,7 +99,9 @@ class Remote:
         self.address, self.patience = address.rstrip("/"), patience
         self._token = os.environ.get(TOKEN, "") if token is None else token
         if not self.address.startswith(("http://", "https://")):
-            raise CutcalError(f"--server {brief(address)}: is no address such as http://127.0.0.1:8000")
+            raise CutcalError(
+                f"--server {brief(address)}: is no address such as http://127.0.0.1:8000 or ws://127.0.0.1:8000"
+            )
         about = self._ask("about", None)
         kind, cameras = about.get("action"), about.get("cameras", [])
         known = isinstance(kind, str) and kind in ACTION_SIZES
@@ -120,14 +122,13 @@ class Remote:
 
     def act(self, obs: dict[str, Any], instruction: str) -> np.ndarray | None:
         """The next action, None when the policy has said that it is done."""
-        if self.action == "joints" and obs.get("joints") is None:
-            raise CutcalError(
-                f"--server {self.address}: {self.name} moves a robot's joints; evaluate it with --world intsim"
-            )
+        if self.action == "joints":
+            joints_of(obs, self.address, self.name)
         if not self._begun:
             self._ask("reset", {"seed": self._seed, "instruction": instruction})
             self._begun = True
-        now = {name: self._image(obs, name) for name in self.cameras} if self._past.maxlen or not self._todo else {}
+        looks = self._past.maxlen or not self._todo
+        now = {name: picture_of(obs, name, self.address, self.name) for name in self.cameras} if looks else {}
         if not self._todo and not self._done:
             joints = obs.get("joints")
             question = {
@@ -146,16 +147,6 @@ class Remote:
             self._todo = [] if self._done and answer.get("actions") == [] else self._actions(answer.get("actions"))
         self._past.append(now)
         return self._todo.pop(0) if self._todo else None
-
-    def _image(self, obs: dict[str, Any], name: str) -> np.ndarray:
-        try:
-            image: np.ndarray = obs["images"][name]
-        except KeyError:
-            raise CutcalError(
-                f"--server {self.address}: {self.name} wants pictures of the camera {name!r}; evaluate it with "
-                "--world intsim and --pixels N"
-            ) from None
-        return image
 
     def _actions(self, given: Any) -> list[np.ndarray]:
         """Checked actions of an answer."""
@@ -191,6 +182,51 @@ class Remote:
         if not isinstance(found, dict):
             raise CutcalError(f"{where}: answers {brief(found)}, not a JSON object")
         return found
+
+
+def picture_of(obs: dict[str, Any], camera: str, address: str, who: str) -> np.ndarray:
+    """What a camera sees.
+
+    Args:
+        obs: The observation.
+        camera: Its name.
+        address: Of the server, for the error.
+        who: Name of the policy, for the error.
+
+    Returns:
+        The picture, from 0 to 255 [-], shape (h, w, 3).
+
+    Raises:
+        CutcalError: There are no such pictures.
+    """
+    try:
+        image: np.ndarray = obs["images"][camera]
+    except KeyError:
+        raise CutcalError(
+            f"--server {address}: {who} wants pictures of the camera {camera!r}; evaluate it with --world intsim and "
+            "--pixels N"
+        ) from None
+    return image
+
+
+def joints_of(obs: dict[str, Any], address: str, who: str) -> np.ndarray:
+    """Joints of the arm and its fingers.
+
+    Args:
+        obs: The observation.
+        address: Of the server, for the error.
+        who: Name of the policy, for the error.
+
+    Returns:
+        The joints [rad, m], shape (9,).
+
+    Raises:
+        CutcalError: There is no robot.
+    """
+    joints = obs.get("joints")
+    if joints is None:
+        raise CutcalError(f"--server {address}: {who} moves a robot's joints; evaluate it with --world intsim")
+    return np.asarray(joints, float)
 
 
 def _encoded(images: dict[str, np.ndarray]) -> dict[str, str]:

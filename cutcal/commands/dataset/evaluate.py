@@ -61,7 +61,9 @@ def add_args(p: Group) -> None:
     p.add_argument(
         "--arm-stiffness", type=number(1, 1e9, "N/m"), metavar="N/M", help="of the arm in the solver (default 1754)"
     )
-    p.add_argument("--server", metavar="URL", help="of --policy remote (intsim.policy.remote)")
+    p.add_argument("--server", metavar="URL", help="of --policy remote; ws://HOST:PORT is openpi's")
+    p.add_argument("--send", action="append", metavar="LAYOUT", help="to openpi: libero (default), droid, or KEY=WHAT")
+    p.add_argument("--replan", type=whole(1), metavar="N", help="of openpi: actions of an answer to use (default: all)")
     p.add_argument("--weights", action="append", metavar="FILE", help="of --policy clone (cutcal dataset clone)")
     p.add_argument(
         "--world", choices=WORLDS, default="table", metavar="NAME", help="table, intsim, or kinematic (no resistance)"
@@ -119,7 +121,7 @@ def _list() -> None:
     for name, (_, what) in POLICIES.items():
         print(f"policy {name:12s}{what}")
     print(f"policy {'clone':12s}does what it has learnt from demonstrations (--weights)")
-    print(f"policy {'remote':12s}is asked of a server, such as those of RDT, Octo and OpenVLA (--server)")
+    print(f"policy {'remote':12s}is asked of a server, such as those of RDT, Octo, OpenVLA and pi0 (--server)")
     for name, suite in SUITES.items():
         print(f"suite  {name:12s}{suite.what}")
 

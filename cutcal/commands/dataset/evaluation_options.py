@@ -46,6 +46,7 @@ def check_options(args: argparse.Namespace) -> None:
     Raises:
         CutcalError: They do not.
     """
+    from intsim.policy.openpi import is_openpi
     from intsim.task.suites import SUITES
 
     unknown = [s for s in args.suite or () if s not in SUITES]
@@ -61,6 +62,8 @@ def check_options(args: argparse.Namespace) -> None:
         raise CutcalError("--severing and --arm-stiffness are of --world table; in intsim the food resists anyway")
     if (args.policy == "remote") != (args.server is not None):
         raise CutcalError("--server URL is that of --policy remote: give both or neither")
+    if (args.send or args.replan) and not is_openpi(args.server or ""):
+        raise CutcalError("--send and --replan are of an openpi server: give --policy remote --server ws://HOST:PORT")
     if args.world == "table" and args.pixels:
         raise CutcalError("--pixels are of a robot's cameras: add --world intsim")
     _check_paper(args)
@@ -89,6 +92,7 @@ def _check_paper(args: argparse.Namespace) -> None:
 def policies_of(args: argparse.Namespace) -> list[NamedPolicy]:
     """Who moves the knife: several where there are several --weights."""
     from intsim.policy.behaviour_cloning import Clone
+    from intsim.policy.openpi import OpenPi, is_openpi
     from intsim.policy.oracles import make_policy
     from intsim.policy.remote import Remote
 
@@ -99,7 +103,8 @@ def policies_of(args: argparse.Namespace) -> list[NamedPolicy]:
             raise CutcalError(f"--weights: two files are called {twice[0]}, and so would their results; rename one")
         return [NamedPolicy(clone, clone.name, part, clone.trained) for clone, part in clones]
     if args.policy == "remote":
-        server = Remote(args.server)
+        openpi = is_openpi(args.server)
+        server = OpenPi(args.server, args.send or (), args.replan) if openpi else Remote(args.server)
         return [NamedPolicy(server, f"remote {server.name}", trained=_trained(args))]
     return [NamedPolicy(make_policy(args.policy, args.sigma or 0.0), args.policy)]
 
