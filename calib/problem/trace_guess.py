@@ -4,8 +4,8 @@ A curve may be that of an edge that pays for new surface, of faces that press th
 descent (:mod:`calib.fit.descent`) seldom leads from one to another. So several begin, each at another food, and go on
 as long as they may win:
 
-- The usual food, from the literature, and a stiffer one that hardly rubs. Friction multiplies what the other two bear, so
-  that much of it hides them: a descent finds its way to much friction, and not back.
+- The usual food, from the literature, and a stiffer one that hardly rubs. Friction multiplies what the other two bear,
+  so that much of it hides them: a descent finds its way to much friction, and not back.
 - What the trace itself says, where it says something: of layers (:mod:`calib.problem.layer_guess`), or of the start of
   a cut. That is a peak with a dip behind it. It tells two numbers: the force at which the cut starts, over the chord
   that the edge has met, and the dent under the edge. How much of the rest the edge bears it does not tell. So there is
@@ -84,8 +84,8 @@ def _stiffer(parameters: ParameterSet) -> dict[str, float]:
 
 
 def _hardly_held(parameters: ParameterSet, guesses: Sequence[FloatArray]) -> FloatArray:
-    """The stiffest of some starts on a board that hardly holds it, the first of equals: its suction is at the low end of
-    its prior."""
+    """The stiffest of some starts, the first of equals, on a board that hardly holds it: its suction is at the low end
+    of its prior."""
     values = [parameters.to_dict(z) for z in guesses]
     stiffest = max(values, key=lambda one: one.get("E", 0.0))
     return parameters.to_vector(stiffest | {BOARD_SUCTION: parameters[BOARD_SUCTION].prior_range[0]})

@@ -94,7 +94,7 @@ def test_the_guess_of_a_fast_cut_is_at_the_reference_speed() -> None:
 
 @pytest.mark.parametrize(("names", "seen"), [(NAMES, 2), (("E", "R", "mu"), 1)])
 def test_a_search_begins_at_a_stiff_food_that_hardly_rubs_too(names: tuple[str, ...], seen: int) -> None:
-    """It comes first, with a fifteenth of the friction and one sd stiffer; the usual one where the trace says nothing."""
+    """It comes first, one sd stiffer, with a fifteenth of the friction; the usual one where the trace says nothing."""
     parameters = fit_parameters(APPLE, names)
     first, *others = (parameters.to_dict(z) for z in trace_guesses(SCENE, parameters, STROKE, made(), 0.1))
     usual = {p.name: p.value for p in parameters}
@@ -107,7 +107,7 @@ def test_a_search_begins_at_a_stiff_food_that_hardly_rubs_too(names: tuple[str, 
 
 
 def test_a_search_begins_on_a_board_that_hardly_holds_the_food_too() -> None:
-    """Where the suction is fitted, the stiffest food of the trace once more, with the suction at its prior's low end."""
+    """Where the suction is fitted, the stiffest food of the trace once more, at the low end of the suction's prior."""
     parameters = fit_parameters(APPLE, (*NAMES, BOARD_SUCTION))
     _, loose, *others = (parameters.to_dict(z) for z in trace_guesses(SCENE, parameters, STROKE, made(), 0.1))
     stiffest = max(others, key=lambda one: one["E"])
