@@ -190,7 +190,7 @@ class CutRun:
 
 def pressed_home(scene: Scene, intervals: Sequence[Interval]) -> bool:
     """Whether an arm that yields presses the edge on the board, and nothing is left to cut nor to come back from."""
-    motion, height = scene.motion, scene.food.shape.height
+    motion, height = scene.motion, scene.food.shape.height - scene.floor
     down = len(intervals) > 1 and all(interval.stroke > height - ON_BOARD for interval in intervals[-2:])
     return down and motion.stroke > height and motion.retract == 0
 

@@ -96,6 +96,9 @@ PROPERTIES: dict[str, Rule] = {
         "Pa", 0.0, 1.1e5, "largest tension between board and flat face of the food, 0 = it lifts off freely",
         "the air presses with no more than its own pressure",
     ),
+    "bow": Rule(
+        "m", -0.05, 0.05, "rise of the middle of the food's underside over its ends, negative where the ends are up",
+    ),
     "loss_factor": Rule("-", 0.0, 1.0, "mechanical loss factor tan(delta) at the first axial mode"),
     "adhesion": Rule("Pa", 1.0, 1e6, "largest normal traction of the food on the blade's faces"),
     "adhesion_energy": Rule("J/m^2", 1e-4, 1e3, "work to take a unit of the food's face off the blade"),
@@ -135,9 +138,9 @@ GIVEN_RATE_RANGE = 0.5
 """The same of a rate exponent, which may be none or negative: the value less and plus this [-]. Assumed: published
 toughnesses of a starch-based food have 0.17 and 0 (docs/theory.md, "Speed of the cut")."""
 
-BOARD_FRICTION, BOARD_SUCTION = BOARD = ("board_friction", "board_suction")
-"""Friction on the board, and what holds a flat wet face down on it. They are none of the food's material, but of how it
-lies there."""
+BOARD_FRICTION, BOARD_SUCTION, BOW = BOARD = ("board_friction", "board_suction", "bow")
+"""Friction on the board, what holds a flat wet face down on it, and where the food touches it. They are none of the
+food's material, but of how it lies there."""
 
 LAYERS = {"rind_thickness": "R_rind", "core_ratio": "R_core"}
 """The size of each layer beside the flesh and its resistance. Only foods whose anatomy has the layer have the two."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from calib.material.food import FoodSpec
 from calib.material.form import ASPECT_SPAN, open_shape
-from calib.material.properties import BOARD_FRICTION, BOARD_SUCTION
+from calib.material.properties import BOARD_FRICTION, BOARD_SUCTION, BOW
 from calib.trace.conditioning import Conditioned
 from mpm.scene import Board, EdgeLaw, Knife, Motion, Numerics, Scene
 from mpm.scene.outline import Outline
@@ -43,7 +43,7 @@ LENGTH_PER_HEIGHT = 4.0
 """Largest simulated length across the blade of a food with parallel sides, over its height. The blade bends its halves
 apart like the arms of a double cantilever beam (Gurney and Hunt 1967), so the force on its faces grows with the length
 (docs/theory.md, "Measured choices")."""
-OF_BOARD = {"mu": BOARD_FRICTION, "suction": BOARD_SUCTION}
+OF_BOARD = {"mu": BOARD_FRICTION, "suction": BOARD_SUCTION, "bow": BOW}
 """Properties of a food that belong to the board under it, by what ``mpm.scene.Board`` calls them."""
 FITTED_SIZES = ("height", "aspect", "roundness")
 """What may be fitted of a specimen beside its material."""

@@ -14,7 +14,7 @@ from calib.trace.mending import mended
 
 CUT, COMPRESSION = "cut", "compression"
 """Kinds of traces."""
-SPECIMEN_PROPERTIES = ("R_skin", "skin_thickness", "initiation_depth", "height", "aspect", "roundness")
+SPECIMEN_PROPERTIES = ("R_skin", "skin_thickness", "initiation_depth", "bow", "height", "aspect", "roundness")
 """What each specimen has of its own unless the study says otherwise: its skin, how its surface gives way, its size and
 form. The rest is flesh and blade, which are the same."""
 KNIFE_PROPERTIES = ("mu",)

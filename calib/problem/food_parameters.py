@@ -21,6 +21,7 @@ LINEAR = {
     "nu": (0.0, 0.49),
     "mu": (0.0, 1.2),
     "relaxing_bulk": (0.0, 1.0),
+    "bow": (-0.002, 0.002),
     "rate_exponent": (-LARGEST_RATE_EXPONENT, LARGEST_RATE_EXPONENT),
 }
 """Properties that are fitted on a linear scale, with their hard bounds."""

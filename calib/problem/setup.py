@@ -11,7 +11,7 @@ from calib.io.provenance import code_key, key_of
 from calib.material.food import FoodSpec
 from calib.material.form import ROUNDNESS
 from calib.material.knife import load_knife
-from calib.material.properties import BOARD_SUCTION
+from calib.material.properties import BOARD_SUCTION, BOW
 from calib.material.remarks import notes
 from calib.material.scene import (
     SizeRange,
@@ -165,6 +165,11 @@ def set_up(request: Request) -> Setup:
         assumed.append(
             "how firmly the board holds the food's wet face is not known: it is fitted; give --set board_suction=0 if "
             "it lay on a rack or on grooves that let air under it"
+        )
+    if BOW in names:
+        assumed.append(
+            "how the food lies on the board is not known: its underside may be bowed, so that it rests on its ends or on "
+            "its middle, and the bow is fitted; give --set bow=0 if it touched the board all along"
         )
     if not request.scaled:  # several are judged together
         check_speeds(names, {curve.trace.source: real_speed(curve)})

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.material.properties import BOARD, BOARD_FRICTION, BOARD_SUCTION
+from calib.material.properties import BOARD, BOARD_FRICTION, BOARD_SUCTION, BOW
 from calib.material.scene import FITTED_SIZES
 from calib.problem.objective import Objective
 from calib.uncertainty.intervals import Uncertainty, marginal_information
@@ -31,6 +31,7 @@ REMEDIES = {
         "suction of the board",
         "a rack or a board with grooves lets air under the food (--set board_suction=0)",
     ),
+    BOW: ("bow", "a specimen that touches the board all along has none (--set bow=0)"),
     "aspect": ("width", "a calliper or a photograph would tell it (--width)"),
     "width": ("width", "a calliper or a photograph would tell it (--width)"),
     "gain": ("gain of the sensor", "a hung mass would tell it (--gain-sd)"),
@@ -45,7 +46,7 @@ class Limiting:
     Attributes:
         name: The parameter whose interval it is.
         parts: Its width over what it is [-], by what would be known: ``roundness``, ``height``,
-            ``aspect``, ``board_friction``, ``board_suction``, ``width``, ``gain``.
+            ``aspect``, ``board_friction``, ``board_suction``, ``bow``, ``width``, ``gain``.
     """
 
     name: str

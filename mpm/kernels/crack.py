@@ -7,7 +7,7 @@ the edge, down to which the edge has cut; the edge's law asks for it.
 
 import taichi as ti
 
-from mpm.kernels.tool import covered_part, edge_height, under_blade
+from mpm.kernels.tool import board_height, covered_part, edge_height, under_blade
 from mpm.state.accessors import to_scene_axes
 from mpm.state.loops import locate_active, repetitions
 from mpm.state.state import SLICES
@@ -93,7 +93,7 @@ def sever(s: ti.template(), cut, p, q):
     """
     if ti.static(s.cuts):
         tip = edge_height(s, cut, q[0])
-        if s.side[cut, p] == 0 and (q[2] > tip or tip <= 0) and under_blade(s, cut, q[0]):
+        if s.side[cut, p] == 0 and (q[2] > tip or tip <= board_height(s, cut, 0.0)) and under_blade(s, cut, q[0]):
             s.side[cut, p] = 1 + particle_half(s, cut, p)
 
 

@@ -3,7 +3,14 @@
 import taichi as ti
 
 from mpm.kernels.signed_distance import blade_distance, coulomb
-from mpm.kernels.tool import blade_velocity, book_impulse, book_knife_impulse, edge_height, under_blade
+from mpm.kernels.tool import (
+    blade_velocity,
+    board_height,
+    book_impulse,
+    book_knife_impulse,
+    edge_height,
+    under_blade,
+)
 from mpm.state.accessors import multiplicity, step_size, to_grid_axes, to_scene_axes
 from mpm.state.loops import locate_active, node_row, repetitions
 from mpm.state.state import NODE_LINES, NODE_ROWS
@@ -189,7 +196,8 @@ def nodal_contact(s: ti.template(), cut, i, j, k, q, u):
     u = to_scene_axes(s, cut, u)
     mult = multiplicity(s, cut, i, j)
     for which in ti.static(range(2)):
-        d, nrm, vel, mu = at[2], ti.Vector([0.0, 0.0, 1.0]), ti.Vector.zero(float, 3), s.par[cut, BOARD_MU]
+        d, mu = at[2] - board_height(s, cut, at[1]), s.par[cut, BOARD_MU]
+        nrm, vel = ti.Vector([0.0, 0.0, 1.0]), ti.Vector.zero(float, 3)
         if ti.static(which == 1):
             above = at[2] - edge_height(s, cut, at[0])
             d, nrm = blade_distance(

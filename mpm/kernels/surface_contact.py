@@ -6,7 +6,14 @@ from mpm.kernels.adhesion import stick_face
 from mpm.kernels.constitutive.laws import full
 from mpm.kernels.crack import particle_half
 from mpm.kernels.signed_distance import blade_distance, blade_opening, stick_slip
-from mpm.kernels.tool import blade_velocity, book_impulse, book_knife_impulse, edge_height, under_blade
+from mpm.kernels.tool import (
+    blade_velocity,
+    board_height,
+    book_impulse,
+    book_knife_impulse,
+    edge_height,
+    under_blade,
+)
 from mpm.state.accessors import to_grid_axes, to_scene_axes, velocity_gradient
 from mpm.state.state import FACE_POINTS, IN_STONE
 from mpm.state.tables import (
@@ -171,7 +178,7 @@ def board_contact(s: ti.template(), cut, p, m, dt, u, at):
     dv = ti.Vector.zero(float, 3)
     shell = s.surface_volume[cut, p][0]
     own = surface_traction(s, cut, p, shell, s.board_gap[cut, p], ti.Vector([0.0, 0.0, 1.0]))
-    force = s.board_gap[cut, p] - at[2] + own[2]
+    force = s.board_gap[cut, p] - (at[2] - board_height(s, cut, at[1])) + own[2]
     own[2] = 0.0
     if force > 0:
         slide = dt * ti.Vector([u[0], u[1], 0.0])

@@ -11,6 +11,7 @@ from mpm.state.tables import (
     ARM_LIMIT,
     ARM_MASS,
     BOOKED_IMPULSE,
+    BOW,
     COMMAND,
     EDGE,
     EDGE_S,
@@ -18,6 +19,8 @@ from mpm.state.tables import (
     EDGE_VZ,
     EDGE_Z,
     FACE,
+    FOOD_MIDDLE,
+    FOOD_REACH,
     HALF_LENGTH,
     INV_DX,
     MOMENT,
@@ -29,6 +32,14 @@ from mpm.state.tables import (
     TILT_RATE,
     TILT_SIN,
 )
+
+
+@ti.func
+def board_height(s: ti.template(), cut, y):
+    """Height of the board at a place across the blade [m]: what a food's bow leaves between the two."""
+    bow = s.par[cut, BOW]
+    off = ti.min(ti.abs(y - s.par[cut, FOOD_MIDDLE]) / s.par[cut, FOOD_REACH], 1.0)
+    return ti.select(bow > 0, -bow * (1 - off * off), bow * off * off)
 
 
 @ti.func
@@ -46,7 +57,8 @@ def set_tool_velocity(s: ti.template(), cut: ti.template()):
             pull = ti.math.clamp(spring, -limit, limit) - s.par[cut, ARM_C] * s.pose[cut, EDGE_VZ]
         s.pose[cut, EDGE_VZ] += (pull * dt + booked - s.pose[cut, BOOKED_IMPULSE]) / s.par[cut, ARM_MASS]
         s.pose[cut, BOOKED_IMPULSE] = booked
-        s.pose[cut, EDGE_VZ] = ti.max(s.pose[cut, EDGE_VZ], -s.pose[cut, EDGE_Z] / dt)  # the board stops the edge
+        down = s.pose[cut, EDGE_Z] - ti.cast(board_height(s, cut, 0.0), ti.f64)
+        s.pose[cut, EDGE_VZ] = ti.max(s.pose[cut, EDGE_VZ], -down / dt)  # the board stops the edge
     else:
         s.pose[cut, EDGE_VZ] = vz
 

@@ -154,6 +154,11 @@ class Scene:
                 f"shape: the blade at {shape.cut * 1e3:g} mm from the middle leaves a slice of {least * 1e3:.3g} mm, "
                 f"under 2 cells of {dx * 1e3:g} mm; cut nearer to the middle or use a smaller dx"
             )
+        if abs(self.board.bow) > dx:
+            raise SceneError(
+                f"board: a bow of {self.board.bow * 1e3:g} mm is more than a cell of {dx * 1e3:g} mm; a food rests on its "
+                "ends or its middle alone long before, so give no more than that"
+            )
         self.food.check_cells(dx)
         self._check_motion()
         self._check_band()
@@ -173,6 +178,17 @@ class Scene:
         """Largest tension between board and food [Pa]: the board's, where the food stands on a flat face."""
         held = self.numerics.contact == "cohesive" and self.food.shape.stands
         return self.board.suction if held else 0.0
+
+    @property
+    def floor(self) -> float:
+        """Height of the board under the edge [m]: 0, and less under a food that rests on its ends."""
+        return float(self.board_height(0.0))
+
+    def board_height(self, y: float) -> float:
+        """Height of the board [m] at a place y across the blade [m]: what the food's bow leaves between the two."""
+        shape, bow = self.food.shape, self.board.bow
+        off = min(abs(y + shape.cut) / (shape.length / 2), 1.0)
+        return -bow * (1.0 - off**2) if bow > 0 else bow * off**2
 
     @property
     def tie_strength(self) -> float:
@@ -264,7 +280,7 @@ class Scene:
             raise SceneError(
                 "knife: a press is level and touches particles; leave out motion.tilt and numerics.contact"
             )
-        if m.stroke + self.drop > height * (1 + 1e-9) and (self.arm.rigid or m.tilt != 0):
+        if m.stroke + self.drop > (height - self.floor) * (1 + 1e-9) and (self.arm.rigid or m.tilt != 0):
             raise SceneError(
                 f"motion: stroke {m.stroke * 1e3:g} mm goes below the board; the food is {height * 1e3:g} mm high"
                 + (f" and the tilted edge reaches {self.drop * 1e3:.1f} mm lower than its middle" if m.tilt else "")
@@ -327,6 +343,8 @@ class Scene:
             out["food"]["shape"]["outline"] = outline.as_dict()
         if out["food"]["shape"]["roundness"] is None:
             del out["food"]["shape"]["roundness"]
+        if out["board"]["bow"] == 0:
+            del out["board"]["bow"]
         for name in ("stone", "cavity", "parted"):
             if not out["food"][name]:  # what a food has not is no part of it
                 del out["food"][name]

@@ -65,11 +65,16 @@ class Board:
         suction: Largest tension between the board and a food that stands on a flat face [Pa]: the air presses a wet
             face to the board as long as none gets under it. A food that touches the board in a line or a point is not
             held, whatever this says.
+        bow: Rise of the middle of the food's underside over its ends [m], along a parabola: such a food rests on its
+            ends. Negative: it rests on its middle, and its ends are up. It is simulated as a board that is hollow, or
+            lower at its ends, by as much under a straight food.
     """
 
     mu: float = 0.5
     suction: float = 0.0
+    bow: float = 0.0
 
     def __post_init__(self) -> None:
         check_number("board", "mu", self.mu, -1e-300, 10.0, "")
         check_number("board", "suction", self.suction, -1e-300, 1e6, "Pa")
+        check_number("board", "bow", self.bow, -0.1, 0.1, "m")

@@ -78,7 +78,8 @@ def _put_tool(table: np.ndarray, scene: Scene, material: Material) -> None:
     """Shape and friction of the tools, and the edge's law."""
     edge, tool = scene.edge, scene.knife
     table[row.BLADE_MU], table[row.BOARD_MU] = material.mu, scene.board.mu
-    table[row.BOARD_SUCTION] = scene.suction
+    table[row.BOARD_SUCTION], table[row.BOW] = scene.suction, scene.board.bow
+    table[row.FOOD_MIDDLE], table[row.FOOD_REACH] = -scene.food.shape.cut, scene.food.shape.length / 2
     table[row.R_START] = material.start
     table[row.INITIATION_DEPTH] = material.initiation_depth
     table[row.SLIP], table[row.ZONE] = edge.slip, scene.process_zone(material)

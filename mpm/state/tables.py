@@ -17,7 +17,8 @@ SPACING, TIE_OPENING, CONTACT, LAYERED = range(37, 41)
 EDGE_BAND, LEAST_GAP = range(41, 43)
 SKIN_STIFFNESS, SKIN_POISSON, WIDTH_OF_FORCE, ZONE_MOST, LEAST_WIDTH, LOCAL_DENT = range(43, 49)
 EXTENSION, DENT_WIDTH, RELAXING_BULK, BOARD_SUCTION = range(49, 53)
-N_PARAMETERS = 53
+BOW, FOOD_MIDDLE, FOOD_REACH = range(53, 56)
+N_PARAMETERS = 56
 
 # Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the node plane
 # along y that is nearest to y = 0, the first and last + 1 node plane along y whose nodes have a second field, how far
