@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.io.progress import Countdown
 from calib.io.provenance import code_key
-from calib.material.properties import BOARD_SUCTION
+from calib.material.properties import BOARD_SUCTION, BOW
 from calib.material.scene import FITTED_SIZES, of_specimen, with_other_particles
 from calib.problem.parameters import LOG_STEP, ParameterSet
 from calib.problem.setup import REPLICATE
@@ -32,7 +32,7 @@ class CutScene:
 
     Attributes:
         scene: The cut at any values.
-        fitted: Whether its specimen is the one whose sizes and roundness are fitted; else they are known and no
+        fitted: Whether its specimen is the one whose sizes, roundness and bow are fitted; else they are known and no
             parameters of it.
         kept: Sizes that do not follow a fitted height.
     """
@@ -44,7 +44,9 @@ class CutScene:
     def at(self, values: Mapping[str, float]) -> tuple[Scene, dict[str, float]]:
         """The scene and the material's values, at values of all parameters. A board that lets air under the food goes
         on to do so."""
-        foreign = {*(() if self.fitted else FITTED_SIZES), *(() if self.scene.suction > 0 else (BOARD_SUCTION,))}
+        foreign = set() if self.fitted else {*FITTED_SIZES, BOW}
+        if not self.scene.suction > 0:
+            foreign.add(BOARD_SUCTION)
         values = {name: x for name, x in values.items() if name not in foreign}
         return of_specimen(self.scene, values, self.kept if self.fitted else ())
 

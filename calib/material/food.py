@@ -21,7 +21,6 @@ from calib.material.own_food import OPTIONAL_HERE, filled
 from calib.material.properties import (
     ADHESION,
     BOARD,
-    BOW,
     DIMENSIONS,
     FORM,
     INCLUSIONS,
@@ -155,12 +154,8 @@ class FoodSpec:
         """Names of the properties that a calibration fits unless told otherwise."""
         start = ("R_skin", "skin_thickness") if self.properties["skin_thickness"].value > 0.0 else ("R_initiation",)
         strength = tuple(name for name in STRENGTHS if name in self.properties)
-        board = tuple(name for name in BOARD if self._left_open(name))
+        board = tuple(name for name in BOARD if name in self.properties and self.properties[name].left_open)
         return ("E", "yield_stress", *strength, "R", *self.layers, *start, "initiation_depth", "mu", *board)
-
-    def _left_open(self, name: str) -> bool:
-        """Whether a property of how the food lies on the board is fitted: one that is 0 is held, a bow one that is given."""
-        return self.properties[BOW].status != "given" if name == BOW and BOW in self.properties else bool(self.value(name))
 
     @property
     def layers(self) -> tuple[str, ...]:

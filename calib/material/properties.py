@@ -232,6 +232,12 @@ class Property:
             text(here.at("flag"), self.flag)
         self._check_range(here)
 
+    @property
+    def left_open(self) -> bool:
+        """Whether a cut is asked for it, of how a food lies: none of it is held, and what may have either sign and is
+        given was measured."""
+        return self.status != "given" if self.low < 0 else self.value != 0
+
     def _check_range(self, here: Place) -> None:
         if self.low > self.high:
             raise here.error(f"has the range {self.low:g} to {self.high:g} {self.unit}; write low <= high")

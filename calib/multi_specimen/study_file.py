@@ -160,7 +160,8 @@ def _board(place: Place, given: Any) -> dict[str, float]:
     """Values of the board under one cut; those of the food are set for all cuts."""
     for name in mapping(place, given):
         if name not in BOARD:
-            raise place.at(name).error(f"only {' and '.join(BOARD)} are set for one cut; set the food's at the top")
+            known = f"{', '.join(BOARD[:-1])} and {BOARD[-1]}"
+            raise place.at(name).error(f"only {known} are set for one cut; set the food's at the top")
     return _values(place, given)
 
 

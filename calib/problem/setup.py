@@ -168,8 +168,8 @@ def set_up(request: Request) -> Setup:
         )
     if BOW in names:
         assumed.append(
-            "how the food lies on the board is not known: its underside may be bowed, so that it rests on its ends or on "
-            "its middle, and the bow is fitted; give --set bow=0 if it touched the board all along"
+            "how the food lies on the board is not known: its underside may be bowed, so that it rests on its ends or "
+            "on its middle; the bow is fitted; give --set bow=0 if it touched the board all along"
         )
     if not request.scaled:  # several are judged together
         check_speeds(names, {curve.trace.source: real_speed(curve)})

@@ -44,7 +44,8 @@ def lay_out(scene: Scene) -> Grid:
         if axis == 1:
             off = abs(shape.cut) if num.grid_turn else shape.cut
             before, after = before + off, after + (off if num.grid_turn else -off)
-        bottom = -PAD if axis == 2 else -math.ceil(before / dx) - room
+        under = PAD + max(math.ceil(abs(scene.board.bow) / dx) - 1, 0)  # a bowed food sags below z = 0
+        bottom = -under if axis == 2 else -math.ceil(before / dx) - room
         top = math.ceil(after / dx) + room
         if axis == 2:  # the blade tips the halves, and their far ends rise
             top = math.ceil(size / dx) + PAD + math.ceil(num.room * deep / 2 / dx)

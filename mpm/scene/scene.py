@@ -154,11 +154,6 @@ class Scene:
                 f"shape: the blade at {shape.cut * 1e3:g} mm from the middle leaves a slice of {least * 1e3:.3g} mm, "
                 f"under 2 cells of {dx * 1e3:g} mm; cut nearer to the middle or use a smaller dx"
             )
-        if abs(self.board.bow) > dx:
-            raise SceneError(
-                f"board: a bow of {self.board.bow * 1e3:g} mm is more than a cell of {dx * 1e3:g} mm; a food rests on its "
-                "ends or its middle alone long before, so give no more than that"
-            )
         self.food.check_cells(dx)
         self._check_motion()
         self._check_band()

@@ -147,16 +147,18 @@ def _laws(result: CalibrationResult) -> list[list[str]]:
     mu = _value(result, "board_friction")
     mu = _part(result, "board", "mu") if mu is None else mu
     if mu is not None:
-        rows.append(("Board", _board(result, mu), "board_friction board_suction"))
+        rows.append(("Board", _board(result, mu), "board_friction board_suction bow"))
     return [[part, law, ", ".join(n for n in names.split() if _known(result, n)) or "–"] for part, law, names in rows]
 
 
 def _board(result: CalibrationResult, mu: float) -> str:
-    """Contact, friction and suction of the board."""
+    """Contact, friction and suction of the board, and where the food touches it."""
     fitted = result.fitted.get("board_suction")
     held = _part(result, "board", "suction") if fitted is None else fitted.value
     pull = f"that holds a wet face [@Stefan 1874] by up to {quantity(held, 'Pa')}" if held else "without adhesion"
-    return f"contact {pull}, Coulomb friction {quantity(mu, '-')}"
+    bow = _value(result, "bow") or _part(result, "board", "bow") or 0.0
+    rests = f"; the food's underside has a bow of {quantity(bow, 'm')}" if bow else ""
+    return f"contact {pull}, Coulomb friction {quantity(mu, '-')}{rests}"
 
 
 def _loss(result: CalibrationResult) -> tuple[str, str, str]:

@@ -1,4 +1,4 @@
-"""Friction and suction of a food's board: properties that belong to the scene's board and not to its material."""
+"""Friction, suction and bow: properties of a food that belong to the board of a scene and not to its material."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, of_specimen, specimen
 from mpm.scene import Board, Scene
 
-CHERRY, APPLE = load_food("cherry"), load_food("apple")
+CHERRY, APPLE, CUCUMBER = load_food("cherry"), load_food("apple"), load_food("cucumber")
 
 
 def scene(food: FoodSpec) -> Scene:
@@ -63,6 +63,16 @@ def test_foods_that_lie_on_a_cut_face_have_a_suction() -> None:
     """And no others: what touches the board in a line or a point is not held."""
     for name, food in load_foods().items():
         assert ("board_suction" in food.properties) == specimen(food, None, Sizing())[0].stands, name
+
+
+def test_a_bow_that_is_given_is_not_fitted() -> None:
+    """A cucumber's is fitted, about a straight one; none and 1 mm are what somebody saw."""
+    assert scene(CUCUMBER).board.bow == 0.0 and "bow" in CUCUMBER.default_fit and "bow" not in APPLE.default_fit
+    for bow in (0.0, 1e-3):
+        seen = CUCUMBER.with_values({"bow": bow})
+        assert set(CUCUMBER.default_fit) - set(seen.default_fit) == {"bow"} and scene(seen).board.bow == bow
+    found, rest = of_specimen(scene(CUCUMBER), {"bow": -5e-4, "E": 2e5})
+    assert rest == {"E": 2e5} and found.board == Board(0.5, 0.0, -5e-4)
 
 
 def test_every_food_says_it(tmp_path: Path) -> None:

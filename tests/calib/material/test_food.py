@@ -88,6 +88,7 @@ def test_shipped_foods(foods: dict[str, FoodSpec]) -> None:
     for food in foods.values():
         assert set(PROPERTIES) - set(food.properties) <= {
             "board_suction",
+            "bow",
             "R_skin",
             "tensile_strength",
             "strength_ratio",
@@ -225,6 +226,7 @@ def test_default_fit_follows_the_skin(foods: dict[str, FoodSpec]) -> None:
         "initiation_depth",
         "mu",
         "board_friction",
+        "bow",
     )
     start = ("R_initiation", "initiation_depth", "mu", "board_friction", "board_suction")
     assert foods["potato"].default_fit == ("E", "yield_stress", "strength_ratio", "R", *start)

@@ -128,7 +128,7 @@ def test_the_command_line_says_how_to_run_it(tmp_path: Path) -> None:
         (
             "width: 0.03",
             "set: {R: 200}",
-            "study.yaml: traces.a.set.R: only board_friction and board_suction are set for one cut",
+            "study.yaml: traces.a.set.R: only board_friction, board_suction and bow are set for one cut",
         ),
         ("speed: 0.02", "speed: -0.02", "study.yaml: traces.b.speed: is -0.02; it must be positive"),
         ("kind: compression", "kind: pull", "study.yaml: traces.gel.kind: unknown value 'pull'"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mpm.discretisation.grid import lay_out
 from mpm.runtime import Runtime
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.scene.errors import SceneError
@@ -61,9 +62,7 @@ SHEAR = FLESH.rho * GRAVITY / (5 / 6 * FLESH.shear)  # the same over its stiffne
 
 def test_it_rests_on_its_ends() -> None:
     """A bar whose middle is off the board sags there as a beam on two supports (Timoshenko 1921), within 5 %."""
-    assert sag(BOW, np.pi / LENGTH) == pytest.approx(
-        5 * WEIGHT * LENGTH**4 / 384 + SHEAR * LENGTH**2 / 8, rel=0.05
-    )
+    assert sag(BOW, np.pi / LENGTH) == pytest.approx(5 * WEIGHT * LENGTH**4 / 384 + SHEAR * LENGTH**2 / 8, rel=0.05)
 
 
 def test_it_rests_on_its_middle() -> None:
@@ -85,10 +84,17 @@ def test_where_the_board_is(bow: float, middle: float, end: float) -> None:
     assert scene.board_height(LENGTH / 2) == scene.board_height(-LENGTH / 2) == pytest.approx(end)
 
 
-def test_a_bow_of_more_than_a_cell_is_refused() -> None:
-    """More than a cell would leave the grid, and changes nothing."""
-    with pytest.raises(SceneError, match="a bow of 3 mm is more than a cell of 2.5 mm"):
-        beam(3e-3)
+@pytest.mark.parametrize(("bow", "cells"), [(0.0, 0), (DX, 0), (-DX, 0), (2.5 * DX, 2), (-2.5 * DX, 2)])
+def test_the_grid_reaches_down_to_the_board(bow: float, cells: int) -> None:
+    """One cell of bow has room anyway; a grid for more is that much deeper."""
+    assert lay_out(beam(bow)).nodes[2] == lay_out(beam(0.0)).nodes[2] + cells
+
+
+@pytest.mark.parametrize("bow", [np.nan, 0.2])
+def test_a_bow_is_a_length(bow: float) -> None:
+    """Anything that no food has is refused."""
+    with pytest.raises(SceneError, match="board: bow"):
+        beam(bow)
 
 
 def test_a_straight_food_has_no_bow_in_its_document() -> None:
