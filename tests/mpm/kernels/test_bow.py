@@ -61,14 +61,14 @@ SHEAR = FLESH.rho * GRAVITY / (5 / 6 * FLESH.shear)  # the same over its stiffne
 
 
 def test_it_rests_on_its_ends() -> None:
-    """A bar whose middle is off the board sags there as a beam on two supports (Timoshenko 1921), within 5 %."""
-    assert sag(BOW, np.pi / LENGTH) == pytest.approx(5 * WEIGHT * LENGTH**4 / 384 + SHEAR * LENGTH**2 / 8, rel=0.05)
+    """A bar whose middle is off the board sags there as a beam on two supports (Timoshenko 1921), within 3 %."""
+    assert sag(BOW, np.pi / LENGTH) == pytest.approx(5 * WEIGHT * LENGTH**4 / 384 + SHEAR * LENGTH**2 / 8, rel=0.03)
 
 
 def test_it_rests_on_its_middle() -> None:
-    """Where its ends are up they sag as cantilevers, within 5 %."""
+    """Where its ends are up they sag as cantilevers, within 3 %."""
     half = LENGTH / 2
-    assert -sag(-BOW, 1.8751 / half) == pytest.approx(WEIGHT * half**4 / 8 + SHEAR * half**2 / 2, rel=0.05)
+    assert -sag(-BOW, 1.8751 / half) == pytest.approx(WEIGHT * half**4 / 8 + SHEAR * half**2 / 2, rel=0.03)
 
 
 def test_a_straight_bar_does_not_sag() -> None:
