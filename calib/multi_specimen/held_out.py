@@ -11,13 +11,15 @@ that.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
+from calib.io.progress import PLAIN_INTERVAL_S, Countdown
 from calib.material.scene import of_specimen
 from calib.multi_specimen.specimens import JointFit, Specimens
 from calib.problem.nuisance import NuisanceEstimate
@@ -233,7 +235,9 @@ def _adapted(
     if result.jacobian is None:
         return [own.values] * len(others)
     evaluator = specimens.evaluator(specimens.setups[name].coarse, name, COARSE)
-    runs = sorted(evaluator.evaluate([{**x, **own.values} for x in (shared, *others)]), key=lambda e: e.index)
+    batch = [{**x, **own.values} for x in (shared, *others)]
+    what = f"{name}, held out: its own values for other flesh, on coarse cells"
+    runs = _counted(evaluator.evaluate(batch), len(batch), what, specimens.say)
     base, *moved = (objective.score(e, coarse=True) for e in runs)
     found = uncertainty(result.parameters, linearised_likelihood(objective, result.best, result.jacobian))
     sd = np.linalg.cholesky(found.alone)
@@ -263,7 +267,8 @@ def _simulated(specimens: Specimens, name: str, batch: list[dict[str, float]]) -
         SimulationError: It has not.
     """
     evaluator = specimens.evaluator(specimens.setups[name].fine, name, FINE)
-    runs = sorted(evaluator.evaluate(batch), key=lambda e: e.index)
+    what = f"{name}, held out: the predicted cut, and those of other flesh for its band"
+    runs = _counted(evaluator.evaluate(batch), len(batch), what, specimens.say)
     if not runs[0].ok:
         raise SimulationError(
             f"{name}: the predicted cut did not reach the end of its stroke with {batch[0]}; give its height if you "
@@ -272,6 +277,29 @@ def _simulated(specimens: Specimens, name: str, batch: list[dict[str, float]]) -
             fraction=0.0,
         )
     return runs
+
+
+def _counted(runs: Iterator[Evaluation], count: int, what: str, say: Callable[[str], None]) -> list[Evaluation]:
+    """Simulations in the order of their values; it is said what they are for, and now and then how many are left.
+
+    Args:
+        runs: The simulations, as they come.
+        count: How many there are.
+        what: What they are for.
+        say: Called with a sentence.
+
+    Returns:
+        All of them.
+    """
+    say(f"{what}: {count} simulations")
+    countdown, told, out = Countdown(count), time.monotonic(), []
+    for run in runs:
+        out.append(run)
+        left = countdown.left(1.0)
+        if time.monotonic() - told >= PLAIN_INTERVAL_S and len(out) < count:
+            told = time.monotonic()
+            say(f"{what}: {len(out)} of {count}, {left}")
+    return sorted(out, key=lambda e: e.index)
 
 
 def _drawn(fit: JointFit, knife: str, scatter: float, seed: int) -> list[dict[str, float]]:

@@ -16,7 +16,7 @@ from calib.fit.options import FitOptions
 from calib.material.food import load_food
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
-from calib.multi_specimen.held_out import HeldOutPrediction, _adapted, _drawn, _own_fit, _OwnFit
+from calib.multi_specimen.held_out import HeldOutPrediction, _adapted, _counted, _drawn, _own_fit, _OwnFit
 from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet
 from calib.uncertainty.predictive import Band
@@ -78,7 +78,7 @@ def test_the_specimens_own_values_are_fitted_to_each_flesh(monkeypatch: pytest.M
         return coarse
 
     specimens: Any = SimpleNamespace(
-        setups={"b": SimpleNamespace(coarse=None)}, evaluator=evaluator, study=SimpleNamespace(seed=0)
+        setups={"b": SimpleNamespace(coarse=None)}, evaluator=evaluator, study=SimpleNamespace(seed=0), say=print
     )
     others = [FLESH | {name: FLESH[name] * k} for name in ("E", "R") for k in (0.8, 1.2)] + [FLESH | {"E": 2e6}]
     found = _adapted(specimens, _OwnFit(objective, result), FLESH, others, "b")
@@ -140,3 +140,15 @@ def test_a_band_wider_than_half_of_the_peak_fails_the_cut(half: float, passes: b
         "c", ("a",), curve, {}, 1.0, compare(stroke, curve, curve), {}, band, 1, (), Scene.__new__(Scene), None, ()
     )
     assert found.width == pytest.approx(2.0 * half, rel=1e-3) and found.passed is passes
+
+
+def test_long_work_says_what_it_is_for_and_what_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before the first simulation and now and then after one, but not behind the last; the order is that of the
+    values."""
+    monkeypatch.setattr(calib.multi_specimen.held_out, "PLAIN_INTERVAL_S", 0.0)
+    said: list[str] = []
+    runs: list[Any] = [SimpleNamespace(index=k) for k in (2, 0, 1)]
+    assert [e.index for e in _counted(iter(runs), 3, "the band", said.append)] == [0, 1, 2]
+    assert said[0] == "the band: 3 simulations" and len(said) == 3
+    assert said[1].startswith("the band: 1 of 3, about ") and said[2].startswith("the band: 2 of 3, about ")
+    assert all(line.endswith(" left") for line in said[1:])
