@@ -138,6 +138,9 @@ GIVEN_RATE_RANGE = 0.5
 """The same of a rate exponent, which may be none or negative: the value less and plus this [-]. Assumed: published
 toughnesses of a starch-based food have 0.17 and 0 (docs/theory.md, "Speed of the cut")."""
 
+GIVEN_BOW_RANGE = 1e-3
+"""The same of a bow: the value less and plus this [m]. Assumed: more than a millimetre changes no force."""
+
 BOARD_FRICTION, BOARD_SUCTION, BOW = BOARD = ("board_friction", "board_suction", "bow")
 """Friction on the board, what holds a flat wet face down on it, and where the food touches it. They are none of the
 food's material, but of how it lies there."""
@@ -316,6 +319,8 @@ def given_range(name: str, value: float) -> tuple[float, float]:
         ends = (rule.low, rule.high)
     if name == RATE_EXPONENT:
         ends = (value - GIVEN_RATE_RANGE, value + GIVEN_RATE_RANGE)
+    if name == BOW:
+        ends = (value - GIVEN_BOW_RANGE, value + GIVEN_BOW_RANGE)
     return max(ends[0], rule.low), min(ends[1], rule.high)
 
 

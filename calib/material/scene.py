@@ -383,15 +383,15 @@ def cut_scene(
     if coarse:
         cell, mach = cell / CELL_PER_ZONE, 2 * mach
     filled = food.to_scene_food()
-    board = {name: food.value(p) for name, p in OF_BOARD.items() if shape.stands or p != BOARD_SUCTION}
-    motion = stroke if isinstance(stroke, Motion) else Motion(stroke or shape.height)
+    known = {name: food.value(p) for name, p in OF_BOARD.items() if shape.stands or p != BOARD_SUCTION}
+    board = Board(**{name: value for name, value in known.items() if value is not None})
+    deepest = shape.height - board.height(shape)
+    motion = stroke if isinstance(stroke, Motion) else Motion(stroke or deepest)
     return Scene(
         food=type(filled)(shape, filled.material),
         knife=knife,
-        board=Board(**{n: v for n, v in board.items() if v is not None}),
-        motion=replace(
-            motion, stroke=min(motion.stroke, shape.height), mach=mach, end_speed=END_SPEED if thick else 1.0
-        ),
+        board=board,
+        motion=replace(motion, stroke=min(motion.stroke, deepest), mach=mach, end_speed=END_SPEED if thick else 1.0),
         edge=EdgeLaw(zone=zone, dent_width=own),
         numerics=Numerics(dx=cell, far=FAR_PER_HEIGHT * shape.height, seed=seed),
     )

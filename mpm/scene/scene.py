@@ -177,13 +177,7 @@ class Scene:
     @property
     def floor(self) -> float:
         """Height of the board under the edge [m]: 0, and less under a food that rests on its ends."""
-        return float(self.board_height(0.0))
-
-    def board_height(self, y: float) -> float:
-        """Height of the board [m] at a place y across the blade [m]: what the food's bow leaves between the two."""
-        shape, bow = self.food.shape, self.board.bow
-        off = min(abs(y + shape.cut) / (shape.length / 2), 1.0)
-        return -bow * (1.0 - off**2) if bow > 0 else bow * off**2
+        return self.board.height(self.food.shape)
 
     @property
     def tie_strength(self) -> float:

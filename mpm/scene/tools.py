@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from mpm.scene.errors import SceneError, check_number
+
+if TYPE_CHECKING:
+    from mpm.scene.shapes import Shape
 
 
 @dataclass(frozen=True)
@@ -78,3 +82,16 @@ class Board:
         check_number("board", "mu", self.mu, -1e-300, 10.0, "")
         check_number("board", "suction", self.suction, -1e-300, 1e6, "Pa")
         check_number("board", "bow", self.bow, -0.1, 0.1, "m")
+
+    def height(self, shape: Shape, y: float = 0.0) -> float:
+        """Height of the board: what the bow of a food leaves between the two.
+
+        Args:
+            shape: Outline of the food.
+            y: Place across the blade [m].
+
+        Returns:
+            The height [m], 0 where the food rests on the board.
+        """
+        off = min(abs(y + shape.cut) / (shape.length / 2), 1.0)
+        return -self.bow * (1.0 - off**2) if self.bow > 0 else self.bow * off**2

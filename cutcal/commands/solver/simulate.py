@@ -18,6 +18,7 @@ from calib.io.typed_document import to_document
 from calib.material.food import FoodSpec
 from calib.material.inclusions import AS_USUAL, check_limit, with_inclusions
 from calib.material.knife import load_knife
+from calib.material.properties import BOW
 from calib.material.scene import blade_warnings, cut_scene, specimen
 from calib.simulation.around_stone import LEAST_TURNS, TURNS
 from calib.simulation.evaluation import FULLY_PARTED, doubts_of_the_crack, pressed_away
@@ -214,7 +215,8 @@ def _stopped(record: ForceRecord) -> bool:
 
 def _scene(args: argparse.Namespace, food: FoodSpec, shape: Shape) -> Scene:
     """The cut that the options ask for."""
-    way = Motion(args.stroke or shape.height, speed=args.speed)
+    deep = shape.height + abs(food.value(BOW) or 0.0)  # to the board, which may lie below the food's middle
+    way = Motion(args.stroke or deep, speed=args.speed)
     scene = cut_scene(food, shape, load_knife(args.knife), stroke=way, dx=args.dx, seed=args.seed)
     scene = with_inclusions(scene, food, args.stone, args.cavity)
     motion = replace(

@@ -71,6 +71,9 @@ def test_a_bow_that_is_given_is_not_fitted() -> None:
     for bow in (0.0, 1e-3):
         seen = CUCUMBER.with_values({"bow": bow})
         assert set(CUCUMBER.default_fit) - set(seen.default_fit) == {"bow"} and scene(seen).board.bow == bow
+    assert scene(CUCUMBER.with_values({"bow": 1e-3})).motion.stroke == pytest.approx(0.043)  # to the board
+    bent = APPLE.with_values({"bow": -5e-4}).properties["bow"]  # of which literature has no range
+    assert (bent.low, bent.high) == (-1.5e-3, 5e-4)
     found, rest = of_specimen(scene(CUCUMBER), {"bow": -5e-4, "E": 2e5})
     assert rest == {"E": 2e5} and found.board == Board(0.5, 0.0, -5e-4)
 

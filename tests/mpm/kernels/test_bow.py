@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -80,8 +82,13 @@ def test_a_straight_bar_does_not_sag() -> None:
 def test_where_the_board_is(bow: float, middle: float, end: float) -> None:
     """The highest places of the board are at 0, and the edge may go down to the board."""
     scene = beam(bow)
-    assert scene.floor == scene.board_height(0.0) == pytest.approx(middle)
-    assert scene.board_height(LENGTH / 2) == scene.board_height(-LENGTH / 2) == pytest.approx(end)
+    board, shape = scene.board, scene.food.shape
+    assert scene.floor == board.height(shape) == pytest.approx(middle)
+    assert board.height(shape, LENGTH / 2) == board.height(shape, -LENGTH / 2) == pytest.approx(end)
+    assert board.height(replace(shape, cut=LENGTH / 4), LENGTH / 4) == pytest.approx(end)
+    assert replace(scene, motion=Motion(SIDE - middle, 1e-3)).motion.stroke == SIDE - middle
+    with pytest.raises(SceneError, match="goes below the board"):
+        replace(scene, motion=Motion(SIDE - middle + 1e-4, 1e-3))
 
 
 @pytest.mark.parametrize(("bow", "cells"), [(0.0, 0), (DX, 0), (-DX, 0), (2.5 * DX, 2), (-2.5 * DX, 2)])
