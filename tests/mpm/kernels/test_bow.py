@@ -34,14 +34,15 @@ def beam(bow: float, contact: str = "cohesive") -> Scene:
     )
 
 
-def sag(bow: float, first: float) -> float:
+def sag(bow: float, first: float, contact: str = "cohesive") -> float:
     """How much further the middle has sunk than the ends, on average over the bar's slowest oscillation [m].
 
     Args:
         bow: Of its underside [m].
         first: Root of the bar's characteristic equation for its lowest mode, over the length that sags [1/m].
+        contact: Of particles' surfaces, or of nodes.
     """
-    scene = beam(bow)
+    scene = beam(bow, contact)
     sim = Simulation(scene, Runtime(threads=1))
     sim.load(FLESH)
     sim.set_pose(1.0)
@@ -60,6 +61,7 @@ def sag(bow: float, first: float) -> float:
 
 WEIGHT = 12 * FLESH.rho * GRAVITY / (FLESH.E * SIDE**2)  # of a bar per length, over its bending stiffness [1/m^3]
 SHEAR = FLESH.rho * GRAVITY / (5 / 6 * FLESH.shear)  # the same over its stiffness in shear [1/m]
+ON_ENDS = 5 * WEIGHT * LENGTH**4 / 384 + SHEAR * LENGTH**2 / 8  # sag of a beam on two supports [m]
 
 
 def test_it_rests_on_its_ends() -> None:
