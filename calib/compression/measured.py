@@ -40,11 +40,11 @@ LOADED, UNLOADED = 0.5, 0.2
 
 
 @dataclass(frozen=True)
-class MeasuredFile:
-    """A file of a compression test: its name and SHA-256, and the columns of the compression and of the load.
+class CompressionFile:
+    """One file of a compression test.
 
     Attributes:
-        name: Its name.
+        name: Name of the file.
         sha256: SHA-256 of a file's content.
         compression: Column of the compression.
         force: Column of the load.
@@ -73,7 +73,7 @@ class MeasuredCompression:
     stress: FloatArray
     slope: FloatArray
     names: list[str]
-    files: tuple[MeasuredFile, ...]
+    files: tuple[CompressionFile, ...]
     notes: tuple[str, ...] = ()
 
     @property
@@ -177,7 +177,7 @@ def read_repeats(
             notes += _later_loadings(where, table, on, way[on])
             rows.append(np.interp(grid, e, s))
             slopes.append(slope(e, s))
-        files.append(MeasuredFile(table.source, table.sha256, compression.name, force.name))
+        files.append(CompressionFile(table.source, table.sha256, compression.name, force.name))
     return MeasuredCompression(grid, np.array(rows), np.array(slopes), names, tuple(files), tuple(notes))
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 
 import pandas as pd
 
-from calib.compression.measured import MeasuredFile
+from calib.compression.measured import CompressionFile
 from calib.compression.modulus import ModulusAtNu
 from calib.compression.press import PressRun
 from calib.io.folder import write_csv, write_json
@@ -211,7 +211,7 @@ class CompressionResult:
     verdicts: Annotated[tuple[Annotated[Verdict, Shared("verdict")], ...], keywords(minItems=1)]
     not_shown: Annotated[tuple[str, ...], Shared("limits")]
     simulation: PressSimulation
-    files: Annotated[tuple[Annotated[MeasuredFile, keywords(description="One file")], ...], keywords(minItems=1)]
+    files: Annotated[tuple[CompressionFile, ...], keywords(minItems=1)]
     versions: Versions
     git: Commit
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Annotated
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.compression.measured import read_repeats, strain_grid
+from calib.compression.measured import CompressionFile, read_repeats, strain_grid
 from calib.compression.modulus import fit_modulus
 from calib.compression.press import homogeneous
-from calib.io.type_schema import Count, NotNegative, Positive, Shared
+from calib.io.type_schema import Count, NotNegative, Positive
 from calib.material.food import FoodSpec
 from calib.multi_specimen.spec import CompressionSpec
 from calib.problem.food_parameters import with_yield_strain
@@ -23,23 +22,6 @@ COMPRESSION_STRAIN = 0.2
 PLATES_SD = 0.13
 """Relative standard deviation of a modulus from plates whose friction is not known [-]: half of what lies between
 frictionless plates and bonded ones (docs/compression.md)."""
-
-
-@dataclass(frozen=True)
-class CompressionFile:
-    """One file.
-
-    Attributes:
-        name: Name of the file.
-        sha256: SHA-256 of a file's content.
-        compression: Column of the compression.
-        force: Column of the load.
-    """
-
-    name: str
-    sha256: Annotated[str, Shared("sha256")]
-    compression: str
-    force: str
 
 
 @dataclass(frozen=True)
@@ -77,8 +59,7 @@ def compression_modulus(spec: CompressionSpec) -> CompressionModulus:
     grid = strain_grid(COMPRESSION_STRAIN)
     found = fit_modulus(measured, homogeneous(spec.nu, grid))
     spread = float(np.hypot(found.sd / found.mean if len(found.E) > 1 else 0.0, PLATES_SD))
-    files = tuple(CompressionFile(**asdict(file)) for file in measured.files)
-    return CompressionModulus(spec.name, found.mean, spread, len(found.E), spec.nu, files)
+    return CompressionModulus(spec.name, found.mean, spread, len(found.E), spec.nu, measured.files)
 
 
 def with_measured_modulus(

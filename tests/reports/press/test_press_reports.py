@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calib.compression.measured import MeasuredFile
+from calib.compression.measured import CompressionFile
 from calib.compression.modulus import ModulusAtNu, ModulusFit
 from calib.compression.modulus_calibration import CompressionTest, acceptance_lines, unshown
 from calib.compression.press import PressRun
@@ -66,7 +66,7 @@ def result(**changes: Any) -> CompressionResult:
         verdicts=lines,
         not_shown=tuple(unshown(test, True, 3)),
         simulation=PressSimulation(PressRun(10, 0.003, 0.001, 4374, 17947, 12.0), 7, "cpu"),
-        files=(MeasuredFile("gel.csv", "c0ffee00" * 8, "compression_mm", "load_N"),),
+        files=(CompressionFile("gel.csv", "c0ffee00" * 8, "compression_mm", "load_N"),),
         versions={"cutcal": "0.2.0"},
         git="c0ffee",
     )
