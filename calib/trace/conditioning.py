@@ -205,7 +205,7 @@ def condition(
         warnings=(
             *_record_warnings(trace),
             *said,
-            *_baseline_warnings(trace, air, force, contact, last),
+            *_baseline_warnings(trace, air, force, replace(contact, peak=peak), last),
             *removed,
             *axis.warnings,
             *board_warnings(trace.source, grid, curve),

@@ -26,6 +26,9 @@ HINGE_TOP_SD = 10.0
 """The hinge is fitted up to this many noise standard deviations above the baseline ..."""
 HINGE_TOP_FRACTION = 0.1
 """... or to this fraction of the largest excursion, whichever is higher."""
+STANDING_SD, STANDING_PART, STANDING_TOP = 3.0, 0.5, 0.25
+"""A force stands under load within so many noise standard deviations of one level for so much of its rise, where the
+rise is high enough for that to be told: the band is at most this part of it."""
 HINGE_FLAT_RATIO = 3.0
 """Length of the hinge's flat part over that of its rise: long enough to fix the level, too short to feel
 drift."""
@@ -263,6 +266,7 @@ def _hinge_onset(time: np.ndarray, force: np.ndarray, index: int, coarse: _Coars
     baseline = estimate_baseline(time, force, coarse.start, index)
     noise = max(baseline.noise_sd, FLOOR_FRACTION * coarse.height)
     high = max(HINGE_TOP_SD * noise, HINGE_TOP_FRACTION * coarse.height)
+    high = _below_a_pause(force[index:] - baseline.level, noise, high)
     kinks = []
     for top in (high, 0.5 * high):
         above = first_sustained(force[index:] > baseline.level + top)
@@ -273,6 +277,28 @@ def _hinge_onset(time: np.ndarray, force: np.ndarray, index: int, coarse: _Coars
     (kink, variance), (other, _) = kinks
     dt = float(np.median(np.diff(time)))
     return kink, float(np.sqrt(variance + dt**2 / 12.0 + (0.5 * (kink - other)) ** 2))
+
+
+def _below_a_pause(rise: np.ndarray, noise: float, top: float) -> float:
+    """The height up to which a rise is one [N]: its top, or less where a knife that pauses on the food lets the force
+    stand below it.
+
+    Args:
+        rise: Force above the baseline from the first excursion on [N], shape (n,).
+        noise: Noise of one sample [N].
+        top: Height up to which the rise would be fitted [N].
+
+    Returns:
+        The height [N].
+    """
+    above = first_sustained(rise > top)
+    below = rise if above is None else rise[:above]
+    band = STANDING_SD * noise
+    if len(below) < 2 * SUSTAIN or 2.0 * band > STANDING_TOP * top:
+        return top
+    stood = float(np.median(below))
+    stands = stood > EXCEED_SD * noise and np.mean(np.abs(below - stood) <= band) > STANDING_PART
+    return stood - band if stands else top
 
 
 def _averaged_hinge(time: np.ndarray, force: np.ndarray, noise: float, inflation: float) -> tuple[float, float]:

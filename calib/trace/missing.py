@@ -161,8 +161,8 @@ def _bridged(
     if stroke[j] <= 0.0 or stroke[i] >= end:
         if stroke[i] >= end * (1 - 1e-3) and stroke[max(i - 1, 0)] < stroke[i] and trace.position is not None:
             return 0.0, [f"{where}: {gap.why}, and the knife turns there; the stroke may be longer than what is used"]
-        if stroke[i] >= end:
-            return 0.0, []
+        if stroke[i] >= end or float(np.max(stroke[: i + 1])) >= end * (1 - 1e-3):
+            return 0.0, []  # behind the cut
         return 0.0, [f"{where}: {gap.why} for {trace.time[j] - trace.time[i]:.3g} s, before contact"]
     if stroke[j] < stroke[i] and trace.position is not None:
         return 0.0, [

@@ -34,6 +34,8 @@ MOST_UNUSED = 5
 """Names that a note on unused columns shows of those that nothing is said of."""
 RISING = 0.1
 """Part of a position's range by which it rises with the force if it is no height."""
+BOTH_WAYS = 0.1
+"""Part of its largest excursion by which a force goes to the other side of its level too if a food holds the knife."""
 TURNED = 0.2
 """Part of a depth's range by which it must fall up to the load for it to be counted negative downwards."""
 
@@ -338,7 +340,12 @@ def _parts_of(table: Table, on: np.ndarray) -> tuple[int, ...]:
 def rises_with_the_force(f: np.ndarray, p: np.ndarray | None) -> bool:
     """Whether a height [m], shape (n,), rises while the force [N], shape (n,), comes from a tenth to nine tenths of its
     largest, so that it is none."""
-    loaded = np.abs(f - np.median(f[: max(5, len(f) // 20)]))
+    loaded = f - np.median(f[: max(5, len(f) // 20)])
+    least, most = np.percentile(loaded, (2, 98))
+    main = loaded if most >= -least else -loaded
+    if min(most, -least) > BOTH_WAYS * max(most, -least):  # what comes first is the cut, what comes later is adhesion
+        main = loaded * np.sign(loaded[int(np.argmax(np.abs(loaded) >= 0.5 * min(most, -least)))])
+    loaded = main
     top = float(np.percentile(loaded, 98))
     late = int(np.argmax(loaded >= 0.9 * top))
     low = np.flatnonzero(loaded[:late] < 0.1 * top)

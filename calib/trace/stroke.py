@@ -265,7 +265,10 @@ def edge_through(stroke: np.ndarray, tared: np.ndarray, end: float) -> float | N
     high = np.flatnonzero(force > THROUGH_LEVEL * force.max())
     last = int(high[-1])
     before = float(np.interp(grid[last] - THROUGH_FALL_M, grid, force))
+    rest = force[last + 1 :]
     if grid[-1] - grid[last] < THROUGH_REST_M or before < THROUGH_FALL * force.max():
+        return None
+    if np.median(rest) < -THROUGH_LEVEL * force.max():  # an overflow, or a level that has moved
         return None
     return float(grid[last + 1])
 

@@ -120,3 +120,18 @@ def test_four_equal_samples_at_the_top_are_clipped() -> None:
     force = np.where(between(2.07, 2.09), 15.5, np.minimum(CUT.force, top))
     with pytest.raises(TraceError, match="the sensor is clipped there"):
         conditioned(CUT.but(force=force))
+
+
+def test_a_sensor_that_stands_on_the_way_up_is_not_said_to_stand_before_contact() -> None:
+    """It comes back when the knife is above the food again; samples that are missing before contact are said."""
+    done = conditioned(CUT.but(force=np.where(between(2.75, 3.05), CUT.force[550], CUT.force)))
+    assert not said(done, "before contact")
+    keep = ~between(0.3, 0.5)
+    assert said(conditioned(Cut(CUT.time[keep], CUT.force[keep], CUT.height[keep])), "s, before contact")
+
+
+def test_the_noise_is_that_of_the_food_where_the_edge_comes_to_the_board() -> None:
+    """A board that bears a hundred newtons makes no smooth data of a sensor's noise."""
+    board = np.where(between(2.4, 2.605), 500.0 * (CUT.time - 2.4), 0.0)
+    done = conditioned(CUT.but(force=CUT.force + board))
+    assert done.at_board and not said(done, "hardly varies")

@@ -113,3 +113,40 @@ def test_a_depth_that_is_called_a_position_is_refused_with_the_option() -> None:
     """It rises as the force grows."""
     with pytest.raises(TraceError, match="column position_m: the position does not descend .*it rises.*--depth-col"):
         condition(Trace(CUT.time, CUT.force, 0.06 - CUT.height, "made.csv", columns=COLUMNS))
+
+
+@pytest.mark.parametrize("pause", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize("load", [0.5, 0.8])
+@pytest.mark.parametrize("relaxing", [False, True])
+def test_a_knife_that_pauses_on_the_food_touched_it_before(pause: float, load: float, relaxing: bool) -> None:
+    """Contact is where the force began to rise, not in the approach, however long the knife stands at a small load."""
+    touch, end = 1.0 + load / 12.0 * 0.022 / SPEED, 2.6 + pause
+    time = np.arange(int((end + 0.6) * RATE)) / RATE
+    height = 0.06 - SPEED * np.where(time < touch, time, np.maximum(time - pause, touch))
+    height = np.where(time < end, height, 0.008 + 0.1 * (time - end))
+    rise = np.interp(np.where(time <= end, 0.04 - height, 0.0), [0.0, 0.022, 0.032], [0.0, 12.0, 9.6])
+    if relaxing:
+        rise *= np.where((time >= touch) & (time < touch + pause), 0.6 + 0.4 * np.exp(-(time - touch) / 0.2), 1.0)
+    force = LEVEL + rise + 0.03 * np.random.default_rng(1).normal(size=len(time))
+    done = condition(Trace(time, force, height, "made.csv", columns=COLUMNS))
+    assert done.onset_s == pytest.approx(1.0, abs=0.03)
+    is_the_cut(done)
+
+
+@pytest.mark.parametrize("adhesion", [6.0, 15.0])
+def test_a_food_that_holds_the_knife_on_its_way_up(adhesion: float) -> None:
+    """The force may go further below its level than it went above it; the stroke is that of the way down."""
+    time = np.arange(900) / RATE
+    height = np.where(time < 2.6, 0.06 - SPEED * time, 0.008 + 0.03 * (time - 2.6))
+    load = np.interp(np.where(time <= 2.6, 0.04 - height, 0.0), [0.0, 0.022, 0.032], [0.0, 12.0, 9.6])
+    held = np.where(time > 2.6, np.sin(np.pi * np.clip((height - 0.008) / 0.032, 0.0, 1.0)), 0.0)
+    force = LEVEL + load - adhesion * held + 0.03 * np.random.default_rng(1).normal(size=900)
+    is_the_cut(condition(Trace(time, force, height, "made.csv", columns=COLUMNS)))
+
+
+def test_a_force_that_falls_far_below_its_level_is_not_through() -> None:
+    """A counter that overflows within the cut is no end of the food: the change is said, and the stroke is whole."""
+    force = np.where(CUT.force > 10.0, CUT.force - 20.0, CUT.force)
+    done = condition(Trace(CUT.time, force, CUT.height, "made.csv", columns=COLUMNS))
+    assert done.stroke_length_m == pytest.approx(TRUE.stroke_length_m, rel=0.02)
+    assert any("the force changes by -20 N from one sample to the next" in note for note in done.warnings)
