@@ -15,9 +15,9 @@ from calib.formats.reader import read_table
 from calib.io.type_schema import Shared
 from calib.io.wording import brief
 from calib.table.table import Table
-from calib.trace.columns import candidates, choose, numbers, without_empty
+from calib.trace.columns import choose, numbers, without_empty
 from calib.trace.mending import noise_of
-from calib.trace.names import stem_of
+from calib.trace.names import candidates, stem_of
 from calib.trace.recorded import MIN_SAMPLES, parse_sign
 from mpm.arrays import FloatArray
 from mpm.scene.shapes import Shape, volume

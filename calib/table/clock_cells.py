@@ -38,12 +38,13 @@ def with_clocks(table: Table) -> Table:
     Returns:
         The same where it has no such clock.
     """
-    columns, units, notes = dict(table.columns), dict(table.units), list(table.notes)
+    columns, units, clocks = dict(table.columns), dict(table.units), []
     for name, cells in table.columns.items():
         seconds = seconds_of(cells)
         if seconds is not None:
             columns[name], units[name] = seconds, "s"
-    return replace(table, columns=_joined(columns, units), units=units, notes=tuple(notes))
+            clocks.append(name)
+    return replace(table, columns=_joined(columns, units), units=units, clocks=tuple(clocks))
 
 
 def seconds_of(cells: Cells) -> np.ndarray | None:
@@ -70,7 +71,16 @@ def seconds_of(cells: Cells) -> np.ndarray | None:
     if pattern is None:
         return None
     found = [pattern.fullmatch(cell) if isinstance(cell, str) else None for cell in cells]
-    return _counted([match.groupdict() for match in found if match]) if all(found) else None
+    return _counted(_padded([match.groupdict() for match in found if match])) if all(found) else None
+
+
+def _padded(parts: list[dict[str, str | None]]) -> list[dict[str, str | None]]:
+    """Times of the day with three digits of milliseconds where those behind a colon lack zeros (``12:00:00:5``)."""
+    ends = [(part.get("s") or "").partition(":") for part in parts]
+    widths = {len(end[2]) for end in ends}
+    if len(widths) == 1 or not all(end[1] for end in ends) or max(widths) > 3:
+        return parts
+    return [part | {"s": f"{whole}:{part_of:0>3}"} for part, (whole, _, part_of) in zip(parts, ends, strict=True)]
 
 
 def _counted(parts: Sequence[Mapping[str, str | None]]) -> np.ndarray | None:
@@ -120,7 +130,7 @@ def _joined(columns: Mapping[str, Cells], units: dict[str, str]) -> dict[str, Ce
     for name, cells in columns.items():
         found = _SECONDS.fullmatch(name)
         tail = re.search(r"secs?$", name, re.IGNORECASE)
-        if not found or not tail or not found.group("stamp"):
+        if not found or not tail:
             continue
         nanos = next((name[: tail.start()] + word for word in _NANOS if name[: tail.start()] + word in columns), None)
         if nanos is None:
@@ -128,7 +138,7 @@ def _joined(columns: Mapping[str, Cells], units: dict[str, str]) -> dict[str, Ce
         whole, part = _floats(cells), _floats(columns[nanos])
         if whole is not None and part is not None:
             stamp = found.group("stamp").rstrip("._/")
-            stamp = stamp if stamp.endswith("stamp") else f"{stamp}.stamp"
+            stamp = stamp if stamp.endswith("stamp") else f"{stamp}.stamp".lstrip(".")
             out[stamp], units[stamp] = whole + 1e-9 * part, "s"
             del out[name], out[nanos]
     return out

@@ -35,6 +35,7 @@ class Table:
         left_out: Columns that the table cannot hold, and why.
         notes: What was done to read the file that its reader should know, one sentence each.
         parts: Index of the first row of each part of a file that begins anew, as where each specimen has its header.
+        clocks: Columns whose cells are dates or times of the day.
         hint: What to do where no column can be chosen, empty for the usual.
     """
 
@@ -48,6 +49,7 @@ class Table:
     left_out: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     parts: tuple[int, ...] = (0,)
+    clocks: tuple[str, ...] = ()
     hint: str = ""
 
     def part(self, on: np.ndarray) -> Table:

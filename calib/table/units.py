@@ -94,7 +94,7 @@ _OTHER_SYSTEMS = {
     Quantity.TIME: {60.0: "min mins minute minutes minuten minuti minutos", 3600.0: "h hr hrs hour hours"},
     Quantity.FORCE: {
         STANDARD_GRAVITY: "kgf kg kp kilogram kilograms kilopond kilogram-force kg-force",
-        1e-3 * STANDARD_GRAVITY: "gf g gram grams gramme grammes gram-force g-force pond",
+        1e-3 * STANDARD_GRAVITY: "gf g gram grams gramme grammes gram-force g-force g-f gmf pond",
         1e-6 * STANDARD_GRAVITY: "mgf mg milligram milligrams",
         1e3 * STANDARD_GRAVITY: "tf tonf tonne-force",
         POUND * STANDARD_GRAVITY: "lbf lb lbs lbsf pound pounds pound-force lb-force",
@@ -203,7 +203,7 @@ class NamedUnit:
 
 
 _BRACKETED = re.compile(r"(.*?\S)[\s_]*[\[({<]\s*([^\[\](){}<>]{1,20}?)\s*[\])}>]\s*")
-_SET_OFF = re.compile(r"(.*?\S)\s*(?:,|/|\bin\b)\s*([^\s,]{1,15})")
+_SET_OFF = re.compile(r"(.*?\S)\s*(?:,|/|\b(?:in|en)\b)\s*([^\s,]{1,15})")
 _LAST_WORD = re.compile(r"(.*[^\s_])[\s_]+([^\s_]{1,15})")
 _JOINED = re.compile(
     r"(.*(?i:force|load|time|depth|displacement|position|stroke|extension|distance|travel|height))"

@@ -14,7 +14,7 @@ from calib.io.wording import LONG, brief, listed, quoted
 from calib.table.numerals import as_plain
 from calib.table.table import Table, as_float
 from calib.table.units import EXAMPLES, SI_OF_ROLE, Unit, unit_of
-from calib.trace.names import KNOWN, LONGEST_NAME, fits, is_depth, meaning, named_like, not_measured, sign_of
+from calib.trace.names import LONGEST_NAME, candidates, is_depth, meaning, named_like, not_measured, sign_of
 
 _LIMITS = {"time": (1e11, "s"), "force": (1e6, "N"), "position": (1e3, "m"), "compression": (1e3, "m")}
 """Largest number of each role: beyond it there is no clock since 1970, no knife and no kitchen."""
@@ -57,16 +57,6 @@ class Column:
     factor: float
     depth: bool = False
     notes: tuple[str, ...] = ()
-
-
-def candidates(table: Table, role: str) -> list[str]:
-    """Columns whose name and unit fit a role; known ones alone if there are any."""
-    fitting = [name for name in table.columns if fits(table, name, role)]
-    for stem in KNOWN.get(role, ()):
-        preferred = [name for name in fitting if meaning(table, name).stem == stem]
-        if preferred:
-            return preferred
-    return fitting
 
 
 def choose(table: Table, role: str, wanted: str | None, option: str | None = None) -> Column:

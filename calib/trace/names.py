@@ -7,7 +7,7 @@ import unicodedata
 from dataclasses import dataclass
 
 from calib.table.table import Table
-from calib.table.units import Unit, is_unit, split_unit, unit_of
+from calib.table.units import Quantity, Unit, is_unit, split_unit, unit_of
 
 _OF_THE_TEST = r"(_(test|d_essai|de_ensayo|di_prova|do_ensaio|measurement|standard|estandar|traverse|traversa))?"
 """What machines write behind the name of a quantity."""
@@ -36,6 +36,13 @@ _STEMS = {
     ),
 }
 _DEPTH = _STEMS["position"][1]
+_MEASURED = "actual|act|current|measured|meas"
+_EITHER_WAY = re.compile(
+    rf"(({_MEASURED}|robot|flange|eef|ee|end_effector|knife|tool|tcp|blade)_)*(z|height|position|pos|pos(e|ition)?_z)"
+    rf"(_({_MEASURED}))*|(.*_)?(crosshead|cross_head|traverse|axial|actuator|ram|piston|machine)_(position|pos|absolute)|s"
+)
+"""Names of the knife's place that say nothing of the direction in which it is counted, which the force then tells. They
+are looked for where no name of ``_STEMS`` is there."""
 _FALLING = _STEMS["compression"][0]
 _KNOWN_FORCE = {"base_fz": -1.0, "knife_fz": 1.0}
 """Columns whose sign is known: robot logs hold the force on the world in the base frame, downwards negative."""
@@ -56,6 +63,7 @@ _ROS = (
     (re.compile(r"(.*[./])?actual_TCP_pose[.\[_]?2\]?"), "position_z", "m"),
     (re.compile(r"(.*[./])?force[./]z"), "force_z", "N"),
     (re.compile(r"(.*[./])?position[./]z"), "position_z", "m"),
+    (re.compile(r"/(.*/)?translation/z"), "translation_z", "m"),
 )
 """Names that programs write whose units are known without being written: text exports of ROS messages, which are in SI
 (REP 103) and whose clocks are known by the program (``rostopic echo -p`` nanoseconds, PlotJuggler and LabVIEW seconds),
@@ -88,15 +96,17 @@ _WORDS = {
             "시간"
         ),
         "force": (
-            "standardkraft prüfkraft kraft belastung fuerza carga forza carico força kracht siła "
+            "standardkraft prüfkraft schneidkraft schnittkraft kraft belastung effort fuerza carga forza carico força "
+            "kracht siła "
             "нагрузка усилие сила 試験力 试验力 荷重 载荷 負荷 负荷 力 하중"
         ),
         "displacement": (
-            "standardweg traversenweg weg distanz stauchung zusammendrückung déplacement deplacement course "
-            "enfoncement desplazamiento recorrido spostamento corsa deslocamento verplaatsing droga przemieszczenie "
+            "standardweg traversenweg verfahrweg kolbenweg weg distanz stauchung zusammendrückung déplacement "
+            "deplacement course enfoncement desplazamiento recorrido spostamento corsa deslocamento verplaatsing droga "
+            "przemieszczenie "
             "перемещение 変位 位移 行程 ストローク 변위"
         ),
-        "height": "höhe hauteur altura altezza hoogte 高さ 高度",
+        "height": "messerposition messerhöhe werkzeugposition höhe hauteur altura altezza hoogte 高さ 高度",
     }.items()
     for word in words.split()
 }
@@ -107,6 +117,8 @@ _FOREIGN = re.compile(
         for word in sorted(_WORDS, key=len, reverse=True)
     )
 )
+_OF_UNIT = {Quantity.TIME: "time", Quantity.FORCE: "force", Quantity.LENGTH: "displacement"}
+"""What a column is called that has no name but its unit."""
 LONGEST_NAME = 200
 """Letters from which on the name of a column means nothing."""
 
@@ -157,8 +169,33 @@ def meaning(table: Table, name: str) -> Meaning:
     stem, named = stem_of(split.stem), split.text
     stated = table.units.get(name, "")
     if not stated:
-        return Meaning(stem, named, named)
+        quantity = "" if named else _named_by_its_unit(table, name)
+        return Meaning(quantity, name, name) if quantity else Meaning(stem, named, named)
     return Meaning(stem if is_unit(named) else stem_of(name), stated, named, stated=True)
+
+
+def _named_by_its_unit(table: Table, name: str) -> str:
+    """What a column is whose name is nothing but a unit; empty for another name.
+
+    ``ms`` and ``seconds`` are clocks. Of ``s``, ``N`` and ``mm`` this is sure only where all names are units.
+    """
+    unit = unit_of(name)
+    if unit is None or unit.quantity is Quantity.OTHER:
+        return ""
+    if unit.quantity is Quantity.TIME and unit.common and len(name) > 1:
+        return "time"
+    return _OF_UNIT[unit.quantity] if all(map(is_unit, table.columns)) else ""
+
+
+def candidates(table: Table, role: str) -> list[str]:
+    """Columns whose name and unit fit a role; known ones alone if there are any, and others only if there are none."""
+    fitting = [name for name in table.columns if fits(table, name, role)] or fitting_else(table, role)
+    fitting = [name for name in fitting if not is_unit(name)] or fitting
+    for stem in KNOWN.get(role, ()):
+        preferred = [name for name in fitting if meaning(table, name).stem == stem]
+        if preferred:
+            return preferred
+    return fitting
 
 
 def fits(table: Table, name: str, role: str) -> bool:
@@ -184,9 +221,30 @@ def fits(table: Table, name: str, role: str) -> bool:
     return True
 
 
+def fitting_else(table: Table, role: str) -> list[str]:
+    """Columns that can have a role where no name and unit fit it.
+
+    They are times of the day and dates by any name, and the knife's place by a name that does not say in which
+    direction it is counted.
+    """
+    if role == "time":
+        return [name for name in table.clocks if name in table.columns and not not_measured(name)]
+    if role == "position":
+        return [name for name in table.columns if counted_either_way(table, name)]
+    return []
+
+
 def named_like(stem: str, role: str) -> bool:
     """Whether a stem is one of a role, and of a measurement."""
     return any(pattern.fullmatch(stem) for pattern in _STEMS[role]) and not not_measured(stem)
+
+
+def counted_either_way(table: Table, name: str) -> bool:
+    """Whether a column is the knife's place by a name that does not say in which direction it is counted."""
+    said = meaning(table, name)
+    measure = said.measure
+    fitting = measure is not None and measure.fits("position") and not not_measured(said.stem)
+    return fitting and not named_like(said.stem, "position") and _EITHER_WAY.fullmatch(said.stem) is not None
 
 
 def not_measured(name: str) -> bool:
@@ -204,12 +262,13 @@ def sign_of(stem: str, role: str) -> float:
     if role == "force":
         return _KNOWN_FORCE.get(stem, 1.0)
     if role == "position":
-        return -1.0 if _DEPTH.fullmatch(stem) else 1.0
+        return -1.0 if is_depth(stem) else 1.0
     if role == "compression":
         return -1.0 if _FALLING.fullmatch(stem) else 1.0
     return 1.0
 
 
 def is_depth(stem: str) -> bool:
-    """Whether a stem is that of a way down, which grows as the knife descends."""
-    return _DEPTH.fullmatch(stem) is not None
+    """Whether a stem is that of a way down, which grows as the knife descends, or says nothing of its direction."""
+    either = _EITHER_WAY.fullmatch(stem) and not named_like(stem, "position")
+    return bool(_DEPTH.fullmatch(stem) or either)

@@ -15,8 +15,8 @@ from calib.io.kinds import COLUMN, check_kind
 from calib.io.wording import LONG, brief, listed, quoted
 from calib.table.table import Table, rows_at
 from calib.trace.clock import running_clock
-from calib.trace.columns import Column, candidates, choose, is_sparse, numbers, without_empty
-from calib.trace.names import COUNTERS, meaning, named_like, not_measured, stem_of
+from calib.trace.columns import Column, choose, is_sparse, numbers, without_empty
+from calib.trace.names import COUNTERS, candidates, counted_either_way, meaning, named_like, not_measured, stem_of
 
 Chosen = TypeVar("Chosen")
 MIN_SAMPLES = 20
@@ -30,6 +30,8 @@ MOST_LETTERS = 450
 """Of an error that says two things at once; a longer one says the first alone."""
 ROWS = "the rows"
 """What the time is called where rows are counted."""
+OF_NUMERALS = ("follow a comma", "set off thousands")
+"""Ends of notes on how numbers are written, which say nothing of whether a column is read."""
 MOST_UNUSED = 5
 """Names that a note on unused columns shows of those that nothing is said of."""
 RISING = 0.1
@@ -265,7 +267,7 @@ def _unused(table: Table, used: Sequence[str], how: Reading, said: Sequence[str]
     Returns:
         The sentence, or nothing where all columns are read.
     """
-    words = [note.removeprefix(f"{table.source}: ") for note in said]
+    words = [note.removeprefix(f"{table.source}: ") for note in said if not note.endswith(OF_NUMERALS)]
     names = [
         name
         for name in table.columns
@@ -357,9 +359,11 @@ def _downwards(table: Table, column: Column, f: np.ndarray, p: np.ndarray) -> tu
     loaded = np.abs(f - np.median(f[: max(5, len(f) // 20)]))
     high = loaded >= 0.5 * np.percentile(loaded, 98)
     risen = float(np.mean(p[high]) - p[0])
-    if risen <= TURNED * np.ptp(p):
+    falls = risen > TURNED * np.ptp(p)
+    name = f"{table.source}: {brief(column.name, LONG)}"
+    if counted_either_way(table, column.name):
+        moves, kind = ("falls", "height") if falls else ("rises", "depth")
+        return (-p if falls else p), (f"{name} {moves} as the knife descends, so it is taken for its {kind}",)
+    if not falls:
         return p, ()
-    note = (
-        f"{table.source}: {brief(column.name, LONG)} falls as the knife descends, so it is taken as negative downwards"
-    )
-    return -p, (note,)
+    return -p, (f"{name} falls as the knife descends, so it is taken as negative downwards",)

@@ -1,0 +1,139 @@
+"""Columns that are called otherwise than usual, and rows that programs write beside the samples, give the same cut."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calib.errors import TraceError
+from calib.trace.conditioning import Conditioned, condition
+from calib.trace.trace import Trace, read_trace
+from tests.calib.made_cuts import made_cut, plain_rows, text_of
+
+CUT = made_cut()
+TRUE = condition(CUT.trace())
+HEADER = "time_s,force_N,position_m"
+DAY = [f"17:33:{33 + t:06.3f}" for t in CUT.time]
+
+
+def read(folder: Path, text: str | bytes, name: str = "cut.csv", **how: Any) -> Trace:
+    """The trace in a text."""
+    path = folder / name
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return read_trace(path, **how)
+
+
+def is_the_cut(trace: Trace) -> Conditioned:
+    """Contact, peak and stroke are those of the made-up cut."""
+    done = condition(trace)
+    assert done.peak_N == pytest.approx(TRUE.peak_N, rel=5e-3)
+    assert done.stroke_source == "position"
+    assert done.stroke_length_m == pytest.approx(TRUE.stroke_length_m, rel=5e-3)
+    assert done.onset_s == pytest.approx(TRUE.onset_s, abs=0.01)
+    return done
+
+
+def cells(place: np.ndarray, clock: list[str] | np.ndarray = CUT.time) -> list[tuple[str, str, str]]:
+    """Time [s] or another clock, force [N] and a place of the knife."""
+    times = [t if isinstance(t, str) else f"{t:.4f}" for t in clock]
+    return [(t, f"{f:.4f}", f"{p:.4f}") for t, f, p in zip(times, CUT.force, place, strict=True)]
+
+
+UP, DOWN = 1e3 * CUT.height, CUT.depth_mm
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "kind"),
+    [
+        ("Crosshead position (mm)", 250.0 - DOWN, "height"),
+        ("Crosshead position (mm)", 50.0 + DOWN, "depth"),
+        ("Axial position [mm]", -DOWN, "height"),
+        ("z_act_mm", UP, "height"),
+        ("actual_position_mm", UP, "height"),
+        ("tcp_pose_z_mm", UP, "height"),
+        ("s [mm]", DOWN, "depth"),
+    ],
+)
+def test_the_force_tells_how_a_place_is_counted(tmp_path: Path, name: str, place: np.ndarray, kind: str) -> None:
+    """A name that does not say it is read beside one that was commanded, and what it was taken for is said."""
+    body = [(*row, "7.0") for row in cells(place)]
+    done = is_the_cut(read(tmp_path, text_of(f"time_s,force_N,{name},z_cmd_mm", body)))
+    assert any(f"{name} " in note and f"so it is taken for its {kind}" in note for note in done.warnings)
+
+
+def test_a_place_whose_name_says_how_it_is_counted_goes_before_another(tmp_path: Path) -> None:
+    """A second column does not make the first one doubtful."""
+    body = [(*row, "7.0") for row in cells(UP)]
+    is_the_cut(read(tmp_path, text_of("time_s,force_N,position_mm,z_act_mm", body)))
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Temps (s);Effort (N);Déplacement (mm)",
+        "Temps en s;Force en N;Course en mm",
+        "Zeit [s];Schneidkraft [N];Verfahrweg [mm]",
+        "s;N;mm",
+        "seconds;Force (N);Stroke (mm)",
+        "sec;Force (N);Stroke (mm)",
+    ],
+)
+def test_further_names_of_time_force_and_way(tmp_path: Path, header: str) -> None:
+    """Words, and units that stand in place of a name."""
+    is_the_cut(read(tmp_path, text_of(header, cells(DOWN), ";")))
+
+
+def test_a_unit_is_no_name_beside_other_names(tmp_path: Path) -> None:
+    """``mm`` beside a position is another length, ``N`` beside words may be a number of samples."""
+    with pytest.raises(TraceError, match="no force column"):
+        read(tmp_path, text_of("time_s,N,position_mm", cells(UP)))
+
+
+def test_a_named_clock_goes_before_one_that_is_called_by_its_unit(tmp_path: Path) -> None:
+    """Milliseconds within a second are no second clock."""
+    body = [(*row, f"{1e3 * (float(row[0]) % 1):.0f}") for row in cells(UP)]
+    is_the_cut(read(tmp_path, text_of("time_s,force_N,position_mm,ms", body)))
+
+
+def test_seconds_and_nanoseconds_without_a_stamp_in_their_names(tmp_path: Path) -> None:
+    """They are one clock."""
+    stamps = [(1_700_000_000 + int(t), round(1e9 * (t % 1))) for t in CUT.time]
+    body = [(*stamp, *row[1:]) for stamp, row in zip(stamps, cells(UP), strict=True)]
+    is_the_cut(read(tmp_path, text_of("sec,nanosec,force_N,position_mm", body)))
+
+
+@pytest.mark.parametrize("name", ["Uhrzeit", "Zeitstempel", "Time (hh:mm:ss.fff)", "Time of day", "Klo"])
+def test_times_of_the_day_under_any_name(tmp_path: Path, name: str) -> None:
+    """Their cells show what they are; a date beside them does not matter."""
+    body = [("12.06.2024", *row) for row in cells(UP, DAY)]
+    is_the_cut(read(tmp_path, text_of(f"Datum;{name};Kraft [N];position_mm", body, ";")))
+
+
+def test_a_named_clock_goes_before_times_of_the_day(tmp_path: Path) -> None:
+    """A stamp in whole seconds beside it is not its rival."""
+    body = [(*row, day[:8]) for row, day in zip(cells(UP), DAY, strict=True)]
+    is_the_cut(read(tmp_path, text_of("time_s,force_N,position_mm,Uhrzeit", body)))
+
+
+def test_milliseconds_behind_a_colon_may_lack_their_zeros(tmp_path: Path) -> None:
+    """``17:33:33:5`` is five milliseconds where another row has ``17:33:33:995``."""
+    milli = np.round(1e3 * CUT.time).astype(int)
+    clock = [f"17:33:{33 + k // 1000}:{k % 1000}" for k in milli]
+    is_the_cut(read(tmp_path, text_of("Time,force_N,position_mm", cells(UP, clock))))
+
+
+@pytest.mark.parametrize("unit", ["g-f", "gmf"])
+def test_further_units_of_force(tmp_path: Path, unit: str) -> None:
+    """They are grams of a load cell."""
+    body = [(t, f"{float(f) / 9.80665e-3:.3f}", z) for t, f, z in plain_rows(CUT)]
+    is_the_cut(read(tmp_path, text_of(f"time_s,Force ({unit}),position_m", body)))
+
+
+def test_how_numbers_are_written_does_not_hide_a_column_that_is_not_used(tmp_path: Path) -> None:
+    """A length that could be the knife's place is named, although its decimals were said to follow a comma."""
+    body = [tuple(cell.replace(".", ",") for cell in row) for row in cells(DOWN)]
+    notes = read(tmp_path, text_of("Zeit [s];Kraft [N];Prüfweg [mm]", body, ";")).notes
+    assert any("not used: Prüfweg [mm] (a length; --position-col takes it" in note for note in notes)
