@@ -1,23 +1,28 @@
-"""JSON logs as tables: lists per channel, lists of records, both in groups, and vectors per sample."""
+"""JSON and YAML logs as tables: lists per channel, lists of records, both in groups, and vectors per sample."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 from calib.errors import TraceError
 from calib.io.wording import brief, quoted
 from calib.table.encoding import decode
 from calib.table.table import MEASURED, Table, check_names
-from calib.table.vector_fields import LONGEST_VECTOR, row_count, table_of_fields, width_of
+from calib.table.vector_fields import LONGEST_VECTOR, table_of_fields, width_of, without_common_group
 
 _UNITS = ("unit", "units")
+_ALIAS = re.compile(r"(^|[:,\[{-])[ \t]+\*\w", re.MULTILINE)
+"""Where YAML says that a part stands elsewhere."""
+_NAMES = ("name", "channel", "label", "title", "id")
+"""Names of the name of a channel, in a list of channels."""
 _VALUES = ("values", "value", "data", "samples")
 """Names of a unit and of the numbers it belongs to, in a group that is one column."""
-_HEADS, _ROWS = ("columns", "header", "headers", "names"), ("data", "rows", "values")
+_HEADS, _ROWS = ("columns", "header", "headers", "names"), ("data", "rows", "values", "samples")
 """Names of a list of names, and of the rows below them, in a group that is a table."""
 
 
@@ -42,8 +47,34 @@ def table_of_json(source: str, raw: bytes) -> Table:
     Raises:
         TraceError: It is not JSON, or holds no lists.
     """
+    return _table_of(source, raw, lambda text: (_parsed(source, text), []), "JSON")
+
+
+def table_of_yaml(source: str, raw: bytes) -> Table:
+    """The table in a YAML file: the messages that ``ros2 topic echo`` and ``rostopic echo`` print, or lists by name.
+
+    Args:
+        source: Name of the file.
+        raw: Its bytes.
+
+    Returns:
+        The table, named as :func:`table_of_json` names it.
+
+    Raises:
+        TraceError: It is not YAML, or holds no lists and no messages.
+    """
+    return _table_of(source, raw, lambda text: _messages(source, text), "YAML")
+
+
+def _table_of(source: str, raw: bytes, parse: Callable[[str], tuple[Any, list[str]]], kind: str) -> Table:
+    """The table in a document, which a function makes of the text, with what it did.
+
+    Raises:
+        TraceError: There is none.
+    """
     try:
-        content, stated = _units_apart(_parsed(source, decode(source, raw, "JSON")[0]))
+        parsed, notes = parse(decode(source, raw, kind)[0])
+        content, stated = _units_apart(parsed)
         found = list(_fields(source, "", content))
     except RecursionError:
         raise TraceError(f"{source}: lists or groups are nested too deeply for a record of a cut") from None
@@ -53,9 +84,10 @@ def table_of_json(source: str, raw: bytes) -> Table:
             "units in the names such as time_s and force_N"
         )
     check_names(source, [name for name, _ in found])
-    fields = _common_group_removed(dict(found))
+    fields = without_common_group(dict(found))
     units = {name: unit for name in fields for key, unit in stated.items() if f".{name}".endswith(f".{key}")}
-    return table_of_fields(source, fields, hashlib.sha256(raw).hexdigest(), label=_label(content), stated=units)
+    table = table_of_fields(source, fields, hashlib.sha256(raw).hexdigest(), label=_label(content), stated=units)
+    return replace(table, notes=(*table.notes, *notes))
 
 
 def _units_apart(content: Any) -> tuple[Any, dict[str, str]]:
@@ -63,6 +95,7 @@ def _units_apart(content: Any) -> tuple[Any, dict[str, str]]:
     units: dict[str, str] = {}
 
     def plain(name: str, value: Any) -> Any:
+        value = _channels_by_name(value) if isinstance(value, list) else value
         if not isinstance(value, dict):
             return value
         lists = [key for key in value if key.lower() in _VALUES and isinstance(value[key], list)]
@@ -79,6 +112,44 @@ def _units_apart(content: Any) -> tuple[Any, dict[str, str]]:
         return {key: plain(key, inner) for key, inner in value.items() if key.lower() not in _UNITS}
 
     return plain("", content), units
+
+
+def _channels_by_name(channels: list[Any]) -> list[Any] | dict[str, Any]:
+    """A list of channels, each with its name and its numbers, as a group; any other list as it is."""
+    found = {}
+    for channel in channels[: LONGEST_VECTOR**2]:
+        name = next((channel[key] for key in _NAMES if key in channel), None) if isinstance(channel, dict) else None
+        if not isinstance(name, str) or not any(isinstance(channel.get(key), list) for key in _VALUES):
+            return channels
+        found[name] = {key: value for key, value in channel.items() if key not in _NAMES}
+    return found if len(found) == len(channels) > 0 else channels
+
+
+def _messages(source: str, text: str) -> tuple[Any, list[str]]:
+    """The document of a YAML file, or the list of its messages, and what was done.
+
+    ROS writes a line of dashes behind each message; a last one without it was cut off, and is left out.
+
+    Raises:
+        TraceError: It is not YAML, or has aliases, with which a small file can be endless.
+    """
+    import yaml
+
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    if _ALIAS.search(text):
+        raise TraceError(f"{source}: YAML with aliases (*name) is not read; write the numbers themselves")
+    pieces = re.split(r"^---[ \t]*\r?$", text, flags=re.MULTILINE)
+    cut = len(pieces) > 1 and bool(pieces[0].strip()) and bool(pieces.pop().strip())
+    read: list[Any] = []
+    pieces = [piece for piece in pieces if piece.strip()]
+    for k, piece in enumerate(pieces, start=1):
+        try:
+            read.append(yaml.load(piece, Loader=loader))
+        except (yaml.YAMLError, ValueError) as error:
+            what = f"message {k} is " if len(pieces) > 1 else ""
+            raise TraceError(f"{source}: {what}not YAML ({brief(str(error))}); remove or repair it") from None
+    notes = [f"{source}: the last message is cut off and was left out"] if cut else []
+    return (read[0] if len(pieces) == 1 else read), notes
 
 
 def _parsed(source: str, text: str) -> Any:
@@ -142,20 +213,6 @@ def _rows_below_names(group: dict[str, Any]) -> dict[str, Any]:
     if not all(isinstance(row, list) and len(row) == len(head) for row in rows):
         return group
     return dict(zip(head, map(list, zip(*rows, strict=True)), strict=True))
-
-
-def _common_group_removed(fields: dict[str, list[Any]]) -> dict[str, list[Any]]:
-    """The same fields without a first group that all columns are in."""
-    rows = row_count(fields)
-    while True:
-        groups = {name.rpartition(".")[0].partition(".")[0] for name, values in fields.items() if len(values) == rows}
-        group = groups.pop()
-        if groups or not group:
-            return fields
-        renamed = {name.removeprefix(f"{group}."): values for name, values in fields.items()}
-        if len(renamed) < len(fields):
-            return fields
-        fields = renamed
 
 
 def _label(content: Any) -> str:

@@ -14,7 +14,7 @@ from scipy.io.matlab import MatReadError
 from calib.errors import TraceError
 from calib.io.wording import brief
 from calib.table.table import Cells, Table
-from calib.table.vector_fields import LONGEST_VECTOR, table_of_fields
+from calib.table.vector_fields import LONGEST_VECTOR, table_of_fields, without_common_group
 
 
 def table_of_matlab(source: str, raw: bytes, address: str) -> Table:
@@ -26,7 +26,7 @@ def table_of_matlab(source: str, raw: bytes, address: str) -> Table:
         address: Variable that holds the table, such as a structure, empty for the whole file.
 
     Returns:
-        The table; a variable of a structure has the name of the structure before its own.
+        The table; a variable of a structure has the name of the structure before its own, where not all are in one.
 
     Raises:
         TraceError: It is damaged, or holds no numbers.
@@ -40,7 +40,7 @@ def table_of_matlab(source: str, raw: bytes, address: str) -> Table:
         if not isinstance(held, Mapping) or part not in held:
             raise TraceError(f"{source}: nothing is called {address} in the file; it holds {', '.join(held)}")
         held = held[part]
-    fields = dict(_columns("", held))
+    fields = without_common_group(dict(_columns("", held)))
     if not fields:
         raise TraceError(f"{source}: no variables with numbers; save time, force and position as vectors of one length")
     units = {}

@@ -20,7 +20,8 @@ _OPEN: dict[bytes, Callable[[io.BytesIO], Any]] = {b"\x1f\x8b": gzip.open, b"BZh
 """What opens a compressed file, by how it begins."""
 _ENDINGS = (".gz", ".bz2", ".xz", ".zip")
 _ZIP = b"PK\x03\x04"
-_SHEETS = (".xlsx", ".xlsm")
+_SEVERAL = (".xlsx", ".xlsm", ".npz")
+"""Endings of archives that are one record."""
 
 
 def unpacked(file: Path, raw: bytes) -> tuple[Path, bytes]:
@@ -41,7 +42,7 @@ def unpacked(file: Path, raw: bytes) -> tuple[Path, bytes]:
         if opener is not None:
             with opener(io.BytesIO(raw)) as packed:
                 return _named(file, file.name), _limited(file, packed)
-        if raw.startswith(_ZIP) and file.suffix.lower() not in _SHEETS:
+        if raw.startswith(_ZIP) and file.suffix.lower() not in _SEVERAL:
             with zipfile.ZipFile(io.BytesIO(raw)) as archive:
                 names = [name for name in archive.namelist() if not name.endswith("/") and "__MACOSX" not in name]
                 if len(names) != 1:

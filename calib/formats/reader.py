@@ -12,13 +12,17 @@ from pathlib import Path
 from calib.errors import TraceError
 from calib.formats.bundled import BUNDLED, bundled_or_same
 from calib.formats.csv_table import table_of_csv
-from calib.formats.json_table import table_of_json
+from calib.formats.json_table import table_of_json, table_of_yaml
+from calib.formats.numpy_table import NPY, table_of_numpy
 from calib.formats.packed import unpacked
 from calib.table.clock_cells import with_clocks
 from calib.table.table import Table
 from mpm.files import read_regular
 
 _JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
+_YAML_SUFFIXES = (".yaml", ".yml")
+_ECHO = re.compile(rb"(\xef\xbb\xbf)?\s*[A-Za-z_]\w*:.*\n(.*\n){0,400}?---[ \t]*\r?\n[ \t]*[A-Za-z_]\w*:")
+"""How the messages of a topic begin that ROS has printed."""
 _JSON_START = re.compile(rb"(\xef\xbb\xbf)?\s*(\{|\[\s*[\[{])")
 _ADDRESS = re.compile(r"(.+\.(?:h5|hdf5|hdf|he5|mat|xlsx|xlsm|tdms)):(.*)", re.IGNORECASE | re.DOTALL)
 _MATLAB_SIGNATURE = b"MATLAB "
@@ -28,7 +32,12 @@ _TDMS_SIGNATURE = b"TDSm"
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
 _NOT_READ = {
     b"\xd0\xcf\x11\xe0": "an .xls file or another document of Microsoft Office before 2007",
-    b"\x93NUMPY": "an array of numpy without names of columns",
+    b"ARROW1": "a file of Arrow or Feather",
+    b"\x80\x04\x95": "objects of Python (pickle), which are not read as they may do anything",
+    b"\x80\x05\x95": "objects of Python (pickle), which are not read as they may do anything",
+    b"<html": "a web page, also where it is called .xls",
+    b"<!DOCTYPE": "a web page, also where it is called .xls",
+    b"<?xml": "an XML file",
 }
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
@@ -41,9 +50,10 @@ def read_table(path: str | Path, decimal: str | None = None) -> Table:
     """Read a table from a file; its content and suffix tell of what kind it is.
 
     Args:
-        path: A text file of cells, a JSON file of lists or records, an HDF5 file (``file.h5``, or ``file.h5:/group``
-            for a group or data set in it), a MATLAB file, an .xlsx file (``file.xlsx:sheet``), a Parquet or TDMS file
-            (``file.tdms:group``), or a bag of ROS. The name of a trace of :mod:`calib.formats.bundled` will do.
+        path: A text file of cells, a JSON or YAML file of lists or records, an HDF5 file (``file.h5``, or
+            ``file.h5:/group`` for a group or data set in it), a MATLAB file, an .xlsx file (``file.xlsx:sheet``), a
+            file of numpy, a Parquet or TDMS file (``file.tdms:group``), or a bag of ROS. The name of a trace of
+            :mod:`calib.formats.bundled` will do.
         decimal: The mark before decimals in a text file, a point or a comma; None to tell it from the numbers.
 
     Returns:
@@ -84,6 +94,8 @@ def _table(path: str | Path, decimal: str | None) -> Table:
         from calib.formats.sheet_table import table_of_sheet
 
         return table_of_sheet(source, raw, address)
+    if raw.startswith(NPY) or (raw.startswith(_ZIP_SIGNATURE) and suffix == ".npz"):
+        return table_of_numpy(file.name, raw)
     if raw.startswith(_TDMS_SIGNATURE):
         from calib.formats.tdms_table import table_of_tdms
 
@@ -93,6 +105,8 @@ def _table(path: str | Path, decimal: str | None) -> Table:
             raise TraceError(f"{file.name}: {what}; export the record as CSV or .xlsx")
     if suffix in _JSON_SUFFIXES or _JSON_START.match(raw):
         return table_of_json(file.name, raw)
+    if suffix in _YAML_SUFFIXES or _ECHO.match(raw):
+        return table_of_yaml(file.name, raw)
     return table_of_csv(file.name, raw, decimal) if len(raw) < LONG_BYTES else _long_csv(file.name, raw, decimal)
 
 

@@ -118,6 +118,28 @@ def row_count(fields: Mapping[str, Cells]) -> int:
     return max([n for n, count in lengths.items() if count > 1] or lengths)
 
 
+def without_common_group(fields: Mapping[str, Cells]) -> dict[str, Cells]:
+    """Fields, as long as most are, without a first group that all of them are in.
+
+    Args:
+        fields: Cells by name, with a point between the name of a group and those in it.
+
+    Returns:
+        The same cells by shorter names, or as they are where two would have one name.
+    """
+    rows = row_count(fields) if fields else 0
+    out = dict(fields)
+    while True:
+        groups = {name.rpartition(".")[0].partition(".")[0] for name, values in out.items() if len(values) == rows}
+        group = groups.pop() if groups else ""
+        if groups or not group:
+            return out
+        renamed = {name.removeprefix(f"{group}."): values for name, values in out.items()}
+        if len(renamed) < len(out):
+            return out
+        out = renamed
+
+
 def width_of(values: Cells) -> int | None:
     """Numbers of each sample of a field, 0 for one alone, None where they differ; a missing sample has any."""
     if isinstance(values, np.ndarray):
