@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from calib.errors import TraceError
 from calib.io.wording import quoted
 from calib.table.clock_cells import is_clock
-from calib.table.numerals import is_number
+from calib.table.numerals import is_number, number_and_unit
 from calib.table.units import is_unit, split_unit
 from calib.table.vector_fields import numbers_of
 
@@ -23,6 +23,8 @@ SAMPLE = 200
 """Lines from which separator and header are told."""
 MOST_BELOW, MOST_BETWEEN, FEW = 40, 20, 5
 """Lines below the last row, lines of words between rows, and rows by which it is told what a row is like."""
+_COMMENT_MARKS = ("%", "//", "!")
+"""What stands before a header as before a comment, beside ``#``."""
 _COMMENT = re.compile(r"(comments?|remarks?|notes?|bemerkung(en)?|kommentar|)", re.IGNORECASE)
 _NUMBER_OF_SPECIMEN = re.compile(r"[\s_#]\d+(?=\s*([\[(].*)?$)")
 """The number of a specimen in the name of a column, as in ``Load 2 (N)``."""
@@ -80,6 +82,9 @@ def layout_of(source: str, body: NumberedLines) -> Layout:
     separator = _separator([line for _, line in body[:SAMPLE]])
     rows = _cells(source, body, separator)
     width = _usual_width(cells for _, cells in rows[:SAMPLE])
+    if separator == " ":
+        top = [(line, _names_with_blanks(text, width)) for line, text in body[: MOST_ABOVE + 2]]
+        rows = [*top, *rows[len(top) :]]
     head = _header(rows, width)
     if head is None:
         header, units, start = ([], [], 0) if _share(rows[0][1]) > 0.5 else (rows[0][1], [], 1)
@@ -89,6 +94,8 @@ def layout_of(source: str, body: NumberedLines) -> Layout:
         header, units = rows[first][1], rows[units_at][1] if units_at is not None else []
         start = (first if units_at is None else units_at) + 1
         above = [cells for _, cells in rows[:first]]
+    if len(header) == width + 1 and header[0].strip() in _COMMENT_MARKS:
+        header, units = header[1:], units[1:]
     if header and len(header) < 2:
         raise TraceError(
             f"{source}: not a CSV file with a force column and one beside it (header: {quoted(header[0])}); separate "
@@ -153,10 +160,25 @@ def _split(line: str, separator: str) -> list[str]:
         return line.split(separator)
 
 
+def _names_with_blanks(text: str, width: int) -> list[str]:
+    """The cells of a line between blanks; names with blanks in them, or before their units, are one where that gives as
+    many cells as the rows have."""
+    cells = text.split()
+    if len(cells) > width > 1:
+        for mark in (r"\s{2,}", r"\s+(?![\[(])"):
+            found = re.split(mark, text.strip())
+            if len(found) == width:
+                return found
+    return cells
+
+
 def _share(cells: Sequence[str]) -> float:
     """Part of the cells that hold anything which hold numbers, vectors or times; 0 where fewer than two do."""
     filled = [cell for cell in cells if cell.strip()]
-    held = sum(is_number(cell) or is_clock(cell) or len(numbers_of(cell)) > 1 for cell in filled)
+    held = sum(
+        is_number(cell) or is_clock(cell) or len(numbers_of(cell)) > 1 or number_and_unit(cell)[1] != ""
+        for cell in filled
+    )
     return held / len(filled) if len(filled) > 1 else 0.0
 
 

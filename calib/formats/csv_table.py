@@ -11,7 +11,7 @@ from calib.errors import TraceError
 from calib.formats.csv_layout import FEW, Layout, are_units, is_words, layout_of
 from calib.io.wording import brief
 from calib.table.encoding import decode
-from calib.table.numerals import as_plain, is_number, styles_of
+from calib.table.numerals import as_plain, is_number, number_and_unit, styles_of
 from calib.table.table import MEASURED, Table, check_names
 from calib.table.units import is_unit, split_unit
 from calib.table.vector_fields import units, written_vectors
@@ -64,6 +64,7 @@ def table_of_csv(source: str, raw: bytes, decimal: str | None = None) -> Table:
         check_names(source, names)
         raise TraceError(f"{source}: a header but no data")
     columns, left_out, more = _columns(source, names, layout)
+    columns, in_cells = _without_units(columns)
     columns, styled = _in_python(source, columns, decimal or _stated_decimal(layout))
     lines = [" ".join(cells) if len(cells) == 1 else ";".join(cells) for cells in layout.above] + comments
     return Table(
@@ -73,7 +74,7 @@ def table_of_csv(source: str, raw: bytes, decimal: str | None = None) -> Table:
         row="row",
         sha256=hashlib.sha256(raw).hexdigest(),
         label=_label(comments),
-        units=units(names, columns) | _units(names, layout, lines) | _units_in_comments(names, heads),
+        units=units(names, columns) | _units(names, layout, lines) | _units_in_comments(names, heads) | in_cells,
         left_out=left_out,
         notes=(*notes, *said, *_left_out(source, layout), *more, *styled),
         parts=layout.parts,
@@ -182,6 +183,21 @@ def _columns(
         found |= split
         notes.append(f"{source}: the cells of {brief(name)} hold vectors, read as {', '.join(split)}")
     return found, left_out, notes
+
+
+def _without_units(columns: dict[str, tuple[str, ...]]) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
+    """The cells without the unit that stands behind each number of a column, and those units by name."""
+    done, units = dict(columns), {}
+    for name, cells in columns.items():
+        filled = [cell for cell in cells if cell.strip()]
+        if not filled or not number_and_unit(filled[0])[1]:
+            continue
+        split = {cell: number_and_unit(cell) for cell in filled}
+        written = {unit for _, unit in split.values()}
+        if len(written) == 1 and "" not in written:
+            units[name] = written.pop()
+            done[name] = tuple(split[cell][0] if cell.strip() else cell for cell in cells)
+    return done, units
 
 
 def _increment(layout: Layout) -> float | None:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from calib.table.table import as_float
+from calib.table.units import is_measured_unit
 
 FEWEST_BARE = 5
 """Different whole numbers below a thousand from which on a column counts in ones."""
@@ -25,6 +26,7 @@ _BOTH = {
 _DECIMAL = {mark: re.compile(rf"[-+]?(?:\d+{re.escape(mark)}\d*|{re.escape(mark)}\d+){_EXPONENT}") for mark in ",."}
 _SPACED = re.compile(r"(?<=\d)[ \u00a0\u2009\u202f'\u2019](?=\d{3}(?!\d))")
 """Blanks and apostrophes between thousands."""
+_WITH_UNIT = re.compile(r"\s*([-+\u2212]?\d[\d.,' \u00a0]*(?:[eE][-+]?\d+)?)\s*([^\W\d_]{1,8})\s*")
 _PRINT = str.maketrans({"\u2212": "-", "\u2013": "-", "\u00a0": " ", "\u202f": " ", "\u2009": " "})
 
 
@@ -65,6 +67,14 @@ def as_plain(cell: str, decimal: str = ".") -> float | None:
 def is_number(cell: str) -> bool:
     """Whether a cell holds a number in any style."""
     return as_float(cell) is not None or any(as_plain(cell, decimal) is not None for decimal in ",.")
+
+
+def number_and_unit(cell: str) -> tuple[str, str]:
+    """A number of any style and the unit of time, force or length behind it, as in ``3.004 N``; empty for others."""
+    found = _WITH_UNIT.fullmatch(cell)
+    if found is None or not is_measured_unit(found[2]) or not is_number(found[1]):
+        return "", ""
+    return found[1], found[2]
 
 
 def styles_of(columns: Mapping[str, Sequence[str]], decimal: str | None = None) -> dict[str, Style]:

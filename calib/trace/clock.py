@@ -77,6 +77,13 @@ def running_clock(
         TraceError: It cannot be repaired; the message names row and column.
     """
     time, force = columns
+    end = _filled(t, f, p)
+    unfilled = []
+    if end < len(t):
+        first = f"{table.row} {brief(table.rows[end])}"
+        unfilled = [f"{table.source}: {len(t) - end} rows of zeros from {first} to the end are no samples; left out"]
+        t, f, p = t[:end], f[:end], None if p is None else p[:end]
+        table = table.part(np.arange(end))
     _check_swapped(table, time, force, t, f)
     order, ordered = _in_order(table, time, (t, f) if p is None else (t, f, p))
     if ordered:
@@ -87,7 +94,7 @@ def running_clock(
         clock = _without_repeats(table, t, f, p)
     else:
         clock = _spread(table, time, t)
-    clock = replace(clock, notes=(*ordered, *clock.notes))
+    clock = replace(clock, notes=(*unfilled, *ordered, *clock.notes))
     clock = _restarted(table, time, clock, p)
     clock = _without_jumps(table, time, clock, p)
     bad = np.flatnonzero(np.diff(clock.time) <= 0.0)
@@ -100,6 +107,13 @@ def running_clock(
         )
     _check_rate(table, time, clock.time, t)
     return replace(clock, kept=order[clock.kept])
+
+
+def _filled(t: np.ndarray, f: np.ndarray, p: np.ndarray | None) -> int:
+    """Rows before the zeros at the end of an array that was longer than the record."""
+    held = (t != 0.0) | (f != 0.0) | (False if p is None else p != 0.0)
+    end = len(t) - int(np.argmax(held[::-1]))
+    return end if held.any() and end < len(t) and t[end - 1] > 0.0 else len(t)
 
 
 def _place(table: Table, column: Column, i: int) -> str:

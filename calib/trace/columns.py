@@ -25,7 +25,8 @@ _EXPECTED = {
     "compression": ("compression_mm", "displacement_mm", "stroke_m"),
 }
 _EMPTY = frozenset(
-    ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "1.#qnan", "-1.#ind", "1.#ind", "missing")
+    "nan -nan +nan nan(ind) -nan(ind) na n/a #n/a #nv #num! #value! #div/0! null none 1.#qnan -1.#ind 1.#ind "
+    "missing".split()
 )
 """What programs write into a cell that holds nothing."""
 EPOCH_S = (9.5e8, 4.1e9)
@@ -38,6 +39,9 @@ SPARSE = 0.1
 """Part of a column's cells that are empty from which on they are other topics' rows, not samples that are missing."""
 MOST_EMPTY = 0.1
 """Part of the rows that may lack a number; a record with more of them has another fault."""
+
+FEWEST_FILLED = 20
+"""Rows with numbers from which on any number of empty ones behind them are an array that was longer than the record."""
 
 
 @dataclass(frozen=True)
@@ -269,17 +273,19 @@ def without_empty(table: Table, columns: Sequence[Column], starts: Sequence[int]
     Returns:
         The same where no cell is empty, or where too many are; else its other rows, with a note.
     """
-    lacking = np.zeros(len(table.rows), dtype=bool)
+    lacking, unfilled = np.zeros(len(table.rows), dtype=bool), np.ones(len(table.rows), dtype=bool)
     names = []
     for column in columns:
         if column.name not in table.columns or is_sparse(table, column.name):
             continue
         empty = empty_cells(table.columns[column.name])
+        unfilled &= empty
         if empty.any():
             names.append(brief(column.name, LONG))
             lacking |= empty
     count = int(np.count_nonzero(lacking))
-    if not names or count > MOST_EMPTY * len(lacking) or lacking[list(starts)].any():
+    behind = int(np.argmin(unfilled[::-1])) if count <= len(lacking) - FEWEST_FILLED else 0
+    if not names or count - behind > MOST_EMPTY * (len(lacking) - behind) or lacking[list(starts)].any():
         return table
     row = f"{table.row} {brief(table.rows[int(np.argmax(lacking))])}"
     rows = f"{count} rows, the first is {row}, were" if count > 1 else f"{row} was"
@@ -303,7 +309,7 @@ def is_sparse(table: Table, name: str) -> bool:
 def _is_empty(cell: Any) -> bool:
     if cell is None or (isinstance(cell, float) and cell != cell):
         return True
-    return isinstance(cell, str) and cell.strip().lower() in _EMPTY
+    return isinstance(cell, str) and (cell.strip().lower() in _EMPTY or not cell.strip().strip("-."))
 
 
 def _number(table: Table, column: Column, i: int, cell: Any) -> float:

@@ -137,3 +137,74 @@ def test_how_numbers_are_written_does_not_hide_a_column_that_is_not_used(tmp_pat
     body = [tuple(cell.replace(".", ",") for cell in row) for row in cells(DOWN)]
     notes = read(tmp_path, text_of("Zeit [s];Kraft [N];Prüfweg [mm]", body, ";")).notes
     assert any("not used: Prüfweg [mm] (a length; --position-col takes it" in note for note in notes)
+
+
+def test_zeros_behind_the_record_are_no_samples(tmp_path: Path) -> None:
+    """An array that was longer than the record; nothing is left out of one whose clock ends at zero."""
+    cut = [*plain_rows(CUT), *[("0.0", "0.0", "0.0")] * 90]
+    done = is_the_cut(read(tmp_path, text_of(HEADER, cut)))
+    assert any("90 rows of zeros from row 642 to the end are no samples" in note for note in done.warnings)
+    before = [(f"{t - CUT.time[-1]:.4f}", f, z) for t, (_, f, z) in zip(CUT.time, plain_rows(CUT), strict=True)]
+    before[-1] = ("0.0", "0.0", "0.0")
+    assert len(read(tmp_path, text_of(HEADER, before)).time) == 640
+
+
+@pytest.mark.parametrize("word", ["nan", "", "-----", ".", "-nan(ind)"])
+def test_an_array_that_was_not_filled(tmp_path: Path, word: str) -> None:
+    """Any number of rows at the end may hold nothing; a force that fails while the clock runs on is refused."""
+    cut = plain_rows(CUT)
+    is_the_cut(read(tmp_path, text_of(HEADER, [*cut, *[(word, word, word)] * 300])))
+    with pytest.raises(TraceError, match="not a number|not finite"):
+        read(tmp_path, text_of(HEADER, [*cut[:400], *[(t, word, z) for t, _, z in cut[400:]]]))
+
+
+@pytest.mark.parametrize("word", ["#DIV/0!", "#NV", "-NaN(ind)", "...", "-----"])
+def test_further_words_for_no_number(tmp_path: Path, word: str) -> None:
+    """The row is left out, and said."""
+    cut = plain_rows(CUT)
+    cut[100] = (cut[100][0], word, cut[100][2])
+    trace = read(tmp_path, text_of(HEADER, cut))
+    is_the_cut(trace)
+    assert trace.notes == ("cut.csv: row 102 was left out, without a number in column force_N",)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "% time_s force_N position_m",
+        "% time force position\n% s N m",
+        "Time (s) Force (N) Position (m)",
+        "Cut of a banana\nTest time (s)   Load cell (N)   Position (m)",
+    ],
+)
+def test_headers_above_cells_that_blanks_separate(tmp_path: Path, header: str) -> None:
+    """Units behind a blank, names with blanks in them, and the mark of a comment."""
+    is_the_cut(read(tmp_path, text_of(header, plain_rows(CUT), " ")))
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "separator"),
+    [
+        ("Reading,Load,Travel,Time", "{k},{f:.3f} N,{d:.4f} mm,{t:.3f} s", ","),
+        ("Time (s),Force (N),Travel (mm)", "{t:.3f},{f:.3f} N,{d:.4f}", ","),
+        ("Zeit;Kraft;Weg", "{t:.3f} s;{f:.3f} N;{d:.4f} mm", ";"),
+        ("Time,Force,Travel", "{t:.3f}s,{m:.1f}mN,{d:.4f}mm", ","),
+    ],
+)
+def test_units_behind_the_numbers(tmp_path: Path, header: str, row: str, separator: str) -> None:
+    """A gauge writes them into each cell."""
+    samples = zip(range(640), CUT.time, CUT.force, 1e3 * CUT.force, CUT.depth_mm, strict=True)
+    body = [row.format(k=k, t=t, f=f, m=m, d=d) for k, t, f, m, d in samples]
+    text = "\n".join([header, *(line.replace(".", ",") if separator == ";" else line for line in body)])
+    is_the_cut(read(tmp_path, text))
+
+
+def test_units_that_change_within_a_column_are_none(tmp_path: Path) -> None:
+    """A gauge that switches its range is not read as one unit."""
+    body = [
+        f"{t:.3f},{f:.3f} N" if f > 5 else f"{t:.3f},{1e3 * f:.0f} mN" for t, f in zip(CUT.time, CUT.force, strict=True)
+    ]
+    with pytest.raises(TraceError, match="no force column"):
+        read(tmp_path, "\n".join(["time_s,Force", *body]))
+    with pytest.raises(TraceError, match="'3004 mN' is not a number"):
+        read(tmp_path, "\n".join(["time_s,Force", *body]), force_col="Force=N")
