@@ -20,6 +20,30 @@ ASPECT_SPAN = 1.25
 """Largest width over height of a specimen, over the likely one, and the likely one over the least [-]: half fruits that
 were cut at 0.4 to 0.6 of their diameter (assumed). That of a width over all sizes of a food would be too wide."""
 
+UNUSUAL = 1.25
+"""Stroke over the largest usual height of a food from which on it is said [-]."""
+
+
+def unusual_stroke(food: FoodSpec, stroke: float, source: str) -> list[str]:
+    """Whether a stroke is longer than the food is usually high, one sentence or none.
+
+    Args:
+        food: The food.
+        stroke: Length of the stroke [m].
+        source: Where it comes from: ``position``, ``speed`` or ``height``.
+
+    Returns:
+        The sentence, with what may be wrong.
+    """
+    most = food.dims["height"].high
+    if source == "height" or stroke <= UNUSUAL * most:
+        return []
+    what = "its unit" if source == "position" else "the speed, and whether the knife stood before it went up (--t-end)"
+    return [
+        f"the stroke of {1e3 * stroke:.0f} mm is longer than {food.name.replace('_', ' ')} is usually high "
+        f"({1e3 * most:.0f} mm at most): check {what}, or give --height"
+    ]
+
 
 def known_of(food: FoodSpec, name: str) -> Property:
     """What the literature says of a property of a food, of a size, or of its width over its height.

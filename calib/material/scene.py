@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.material.food import FoodSpec
-from calib.material.form import ASPECT_SPAN, open_shape
+from calib.material.form import ASPECT_SPAN, open_shape, unusual_stroke
 from calib.material.properties import BOARD_FRICTION, BOARD_SUCTION, BOW
 from calib.trace.conditioning import Conditioned
 from mpm.scene import Board, EdgeLaw, Knife, Motion, Numerics, Scene
@@ -115,6 +115,7 @@ def specimen(
         default = replace(default, kind=OUTLINE, outline=sizing.outline)
     height, fits_height = sizing.height, False
     if height is None and trace is not None and trace.stroke_source != "height":
+        said += unusual_stroke(food, trace.stroke_length_m, trace.stroke_source)
         free = height_range(food, trace, sizing)
         if free is None:
             height = trace.stroke_length_m

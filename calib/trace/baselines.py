@@ -7,7 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.errors import TraceError
-from calib.trace.contact_onset import MIN_BASELINE, Baseline, ContactOnset, estimate_baseline
+from calib.trace.contact_onset import (
+    MIN_BASELINE,
+    SUSTAIN,
+    Baseline,
+    ContactOnset,
+    estimate_baseline,
+    first_sustained,
+)
 from calib.trace.mending import noise_of
 from calib.trace.trace import Trace
 
@@ -33,6 +40,14 @@ LEVEL_BEHIND, REST_SD = 20, 3.0
 do."""
 BEHIND_SAMPLES = 5
 """Samples behind the cut from which on they have a level."""
+
+RELEASE_SD = 4.0
+"""The force is released when it stays within this many noise standard deviations of the baseline ..."""
+RELEASE_FRACTION = 0.05
+"""... or below this fraction of the peak, whichever is higher: a baseline drifts during a cut."""
+UNLOADING_TIME, UNLOADING_PART, UNLOADING_FROM = 0.1, 0.1, 0.25
+"""A knife that turns is unloaded within this part of the time from contact to release, in steps of at least this part
+of the largest, from at least this part of the peak: the food that it leaves behind does not bear it any more."""
 
 
 @dataclass(frozen=True)
@@ -172,6 +187,38 @@ def behind_the_cut(trace: Trace, tared: np.ndarray, contact: ContactOnset) -> np
     level = float(np.median(last))
     still = float(np.std(last)) <= REST_SD * noise
     return np.arange(len(tared) - count, len(tared)) if still and level < 0.0 else np.empty(0, dtype=int)
+
+
+def release_of(time: np.ndarray, tared: np.ndarray, contact: ContactOnset) -> tuple[float, bool]:
+    """Time from which on the food no longer bears the knife, and whether the record has it.
+
+    The force is then back at the baseline for good. Where it got there at once, the knife turned when it began to fall.
+
+    Args:
+        time: Time [s], shape (n,).
+        tared: Force above the baseline [N], shape (n,).
+        contact: Its contact.
+
+    Returns:
+        The time of the first such sample [s]; the end of the record, and False, where the force is not released.
+    """
+    noise = contact.baseline.noise_sd
+    limit = max(RELEASE_SD * noise, RELEASE_FRACTION * contact.peak)
+    after_last = first_sustained((tared > limit)[::-1])
+    last = len(tared) - 1 - (after_last or 0)
+    if last >= len(tared) - SUSTAIN:
+        return float(time[-1]), False
+    release = float(time[last + 1])
+    falls = tared[:-1] - tared[1:]
+    first = int(np.searchsorted(time, release - UNLOADING_TIME * (release - contact.onset)))
+    at = first + int(np.argmax(falls[first : last + 2]))
+    least = max(UNLOADING_PART * float(falls[at]), 2.0 * RELEASE_SD * noise)
+    gentle = np.flatnonzero(falls[first:at] < least)
+    if len(gentle):
+        turn = first + int(gentle[-1]) + 1
+        if falls[at] >= least and tared[turn] > UNLOADING_FROM * contact.peak:
+            return float(time[turn + 1]), True
+    return release, True
 
 
 def trigger_contact(trace: Trace, force: np.ndarray) -> ContactOnset:

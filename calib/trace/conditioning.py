@@ -26,7 +26,15 @@ from calib.trace.baselines import (
 )
 from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, ContactOnset, estimate_baseline, find_contact_onset
 from calib.trace.cuts import single_cut
-from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, parabola_peak, resample, smooth
+from calib.trace.filters import (
+    FILTER_SD_M,
+    N_STROKE,
+    filtered_noise,
+    leading_grid,
+    parabola_peak,
+    resample,
+    smooth,
+)
 from calib.trace.mending import mended
 from calib.trace.missing import held_samples
 from calib.trace.recorded import rises_with_the_force
@@ -164,10 +172,11 @@ def condition(
     into, deep = (int(np.searchsorted(trace.time, contact.onset)), int(np.argmax(axis.stroke >= axis.end * (1 - 1e-9))))
     out = out_of_the_food(trace, contact)
     sudden = sudden_changes(trace, tared, (into, deep), out, held.sound)
-    grid, curve = _on_grid(trace.time, axis.stroke, tared, (contact.onset, axis.end), held.sound)
+    sound = held.sound & ~(axis.released & (axis.stroke >= axis.end * (1 - 1e-9)))
+    grid, curve = _on_grid(trace.time, axis.stroke, tared, (contact.onset, axis.end), sound)
     length = float(grid[-1])
     samples = int(np.count_nonzero((axis.stroke >= 0.0) & (axis.stroke <= length)))
-    noise = _filtered_noise(contact, samples, length)
+    noise = filtered_noise(contact.baseline, samples, length)
     peak = parabola_peak(curve)
     _check_peak(trace, peak)
     behind_sd, behind = level_behind(trace, tared, behind_the_cut(trace, tared, contact), peak, level.noise_sd)
@@ -371,22 +380,14 @@ def _on_grid(
     first = int(away[-1]) if len(away) else 0
     deepest = np.maximum.accumulate(stroke[first : last + 1])
     advancing = (deepest - stroke[first : last + 1] <= DWELL_M) & sound[first : last + 1]
-    advancing[[0, -1]] = True
+    advancing[0] = True
     s, f = deepest[advancing], tared[first : last + 1][advancing]
+    if not advancing[-1]:  # the force is held over a last sample that does not show it
+        s, f = np.append(s, deepest[-1]), np.append(f, f[-1])
     if s[0] > whole[0]:
         s, f = np.concatenate([[whole[0]], s]), np.concatenate([[0.0], f])
     force = resample(s, f, whole)
     return grid, smooth(grid, force[len(lead) :], FILTER_SD_M, before=force[: len(lead)])
-
-
-def _filtered_noise(contact: ContactOnset, samples: int, length: float) -> float:
-    """Standard deviation of the noise that is left in a point of the filtered curve [N].
-
-    The Gaussian averages 2 sqrt(pi) of its standard deviations' worth of samples.
-    """
-    base = contact.baseline
-    averaged = 2.0 * np.sqrt(np.pi) * FILTER_SD_M * samples / length
-    return float(base.noise_sd * np.sqrt(min(1.0, base.inflation / max(averaged, 1.0))))
 
 
 def _check_peak(trace: Trace, peak: float) -> None:

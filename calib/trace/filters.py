@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.errors import CurveError, TraceError
+from calib.trace.contact_onset import Baseline
 
 N_STROKE = 240
 """Number of stroke points of every curve; the slope part of the ISO rating depends on it, so it is fixed."""
@@ -266,3 +267,20 @@ def _correlate(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
     reach = len(weight) // 2
     full: np.ndarray = np.convolve(values, weight[::-1])
     return full[reach : reach + len(values)]
+
+
+def filtered_noise(baseline: Baseline, samples: int, length: float) -> float:
+    """Standard deviation of the noise that is left in a point of the filtered curve [N].
+
+    The Gaussian averages 2 sqrt(pi) of its standard deviations' worth of samples.
+
+    Args:
+        baseline: Noise of one sample, and its correlation.
+        samples: Samples on the stroke.
+        length: Length of the stroke [m].
+
+    Returns:
+        The standard deviation [N].
+    """
+    averaged = 2.0 * np.sqrt(np.pi) * FILTER_SD_M * samples / length
+    return float(baseline.noise_sd * np.sqrt(min(1.0, baseline.inflation / max(averaged, 1.0))))

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.errors import TraceError
-from calib.trace.contact_onset import SUSTAIN, ContactOnset, first_sustained
+from calib.trace.baselines import release_of
+from calib.trace.contact_onset import ContactOnset
 from calib.trace.filters import N_STROKE, resample, smooth
 from calib.trace.trace import Trace
 
@@ -17,10 +18,6 @@ repeatability. The stroke is over where it comes that near to the lowest of all;
 BACKING_UP_M, BACKING_UP_SD = 1e-3, 5.0
 """A knife goes up within its stroke if it does so by more than this, and than so many standard deviations of the change
 of its pace from sample to sample."""
-RELEASE_SD = 4.0
-"""The force is released when it stays within this many noise standard deviations of the baseline ..."""
-RELEASE_FRACTION = 0.05
-"""... or below this fraction of the peak, whichever is higher: a baseline drifts during a cut."""
 STROKE_RANGE_M = (1e-3, 0.5)
 """Strokes outside are taken for a unit mix-up [m]: less than a grape's skin, more than any kitchen
 knife's way."""
@@ -56,6 +53,7 @@ class StrokeAxis:
         source: Where it comes from: ``position``, ``speed`` or ``height``.
         warnings: What a reader should know of it, one sentence each.
         at_board: Whether it ends where the force says that the edge is on the board.
+        released: Whether it ends with the first sample in which the food no longer bears the knife.
     """
 
     stroke: np.ndarray
@@ -63,6 +61,7 @@ class StrokeAxis:
     source: str
     warnings: tuple[str, ...] = ()
     at_board: bool = False
+    released: bool = False
 
 
 def end_of_descent(trace: Trace) -> int:
@@ -144,7 +143,7 @@ def _at_constant_speed(
     trace: Trace, tared: np.ndarray, contact: ContactOnset, speed: float | None, height: float | None
 ) -> StrokeAxis:
     """The time since contact at a known speed, or at that which goes through the food from contact to release."""
-    release, released = _release(trace.time, tared, contact)
+    release, released = release_of(trace.time, tared, contact)
     warnings: tuple[str, ...] = ()
     if speed is not None:
         rate, source = speed, "speed"
@@ -157,7 +156,8 @@ def _at_constant_speed(
             f"{1e3 * height:.3g} mm at constant speed ({1e3 * rate:.3g} mm/s); a fitted stiffness or R "
             "inherits that guess",
         )
-    return StrokeAxis(rate * (trace.time - contact.onset), rate * (release - contact.onset), source, warnings)
+    stroke, end = rate * (trace.time - contact.onset), rate * (release - contact.onset)
+    return StrokeAxis(stroke, end, source, warnings, released=released)
 
 
 def stroke_in_food(
@@ -384,13 +384,3 @@ def board_warnings(source: str, stroke: np.ndarray, curve: np.ndarray) -> list[s
         f"stroke, up to {steep:.0f} times as steeply as before: the edge may be on the board; end the cut before it "
         "with --t-end, or give --height or --board-z"
     ]
-
-
-def _release(time: np.ndarray, tared: np.ndarray, contact: ContactOnset) -> tuple[float, bool]:
-    """Time at which the force is back at the baseline for good, and whether the record has it."""
-    limit = max(RELEASE_SD * contact.baseline.noise_sd, RELEASE_FRACTION * contact.peak)
-    after_last = first_sustained((tared > limit)[::-1])
-    last = len(tared) - 1 - (after_last or 0)
-    if last >= len(tared) - SUSTAIN:
-        return float(time[-1]), False
-    return float(time[last + 1]), True

@@ -106,3 +106,13 @@ def test_only_shapes_of_the_family_have_one() -> None:
             for end in (food.roundness.low, food.roundness.high):
                 drawn = with_roundness(food, end, status="given", source="test")
                 assert drawn.to_scene_food().shape.roundness == end
+
+
+@pytest.mark.parametrize(("speed", "unusual"), [(0.02, False), (0.06, True)])
+def test_a_stroke_longer_than_the_food_is_high_is_said(record: Trace, speed: float, unusual: bool) -> None:
+    """A wrong speed, or a knife that stood before it went up; not where the height is given."""
+    bare = replace(record, position=None)
+    said = set_up(Calibration("banana", bare, speed=speed).request()).assumed
+    assert (
+        any("longer than banana is usually high (45 mm at most): check the speed" in text for text in said) == unusual
+    )

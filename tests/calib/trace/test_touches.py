@@ -150,3 +150,27 @@ def test_a_force_that_falls_far_below_its_level_is_not_through() -> None:
     done = condition(Trace(CUT.time, force, CUT.height, "made.csv", columns=COLUMNS))
     assert done.stroke_length_m == pytest.approx(TRUE.stroke_length_m, rel=0.02)
     assert any("the force changes by -20 N from one sample to the next" in note for note in done.warnings)
+
+
+@pytest.mark.parametrize("cutoff", [None, 15.0])
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_a_force_that_grows_until_the_knife_turns(cutoff: float | None, power: float) -> None:
+    """Without a position the fall to nothing is no part of the cut, at once or behind the sensor's filter."""
+    time = np.arange(640) / RATE
+    load = np.where(time <= 2.6, 12.0 * np.clip((time - 1.0) / 1.6, 0.0, None) ** power, 0.0)
+    for k in range(1, 640 if cutoff else 0):
+        load[k] = load[k - 1] + (1.0 - np.exp(-2.0 * np.pi * cutoff / RATE)) * (load[k] - load[k - 1])
+    force = LEVEL + load + 0.03 * np.random.default_rng(1).normal(size=640)
+    done = condition(Trace(time, force, None, "made.csv", columns=COLUMNS), speed=SPEED)
+    assert done.peak_N == pytest.approx(12.0, rel=0.02)
+    assert done.stroke_length_m == pytest.approx(0.032, abs=8e-4)
+    assert done.curve[-1] > 0.95 * done.peak_N
+
+
+def test_a_force_that_fades_is_followed_to_its_end() -> None:
+    """A round food bears the knife less and less; that is no knife that turns."""
+    time = np.arange(640) / RATE
+    load = 12.0 * np.sqrt(np.clip(1.0 - ((time - 1.8) / 0.8) ** 2, 0.0, None))
+    force = LEVEL + load + 0.03 * np.random.default_rng(1).normal(size=640)
+    done = condition(Trace(time, force, None, "made.csv", columns=COLUMNS), speed=SPEED)
+    assert done.stroke_length_m == pytest.approx(0.032, abs=1e-3)
