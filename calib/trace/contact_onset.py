@@ -22,6 +22,9 @@ COARSE_FRACTION = 0.5
 baseline begins."""
 FLAT_FRACTION = 0.03
 """Change between the halves of a window, over the largest excursion, up to which it can be a baseline."""
+STEADY_SAMPLES, STEADY_SD = 10, 15.0
+"""Samples over which noise is taken to be correlated where a stretch is told from a slow rise, and standard deviations
+of it that an excursion must have for that."""
 HINGE_TOP_SD = 10.0
 """The hinge is fitted up to this many noise standard deviations above the baseline ..."""
 HINGE_TOP_FRACTION = 0.1
@@ -194,6 +197,13 @@ def _median_and_sd(values: np.ndarray) -> tuple[float, float]:
 
 
 def _coarse_contact(force: np.ndarray) -> _Coarse:
+    """First sustained excursion above a stretch that is as flat as its noise lets it be told, else nearly flat."""
+    found = _excursion(force, STEADY_SAMPLES)
+    clear = found.index is not None and found.height > STEADY_SD * found.noise
+    return found if clear else _excursion(force, None)
+
+
+def _excursion(force: np.ndarray, steady: int | None) -> _Coarse:
     """First sustained excursion above a flat stretch, searched backwards from half the largest excursion.
 
     The stretch is the second half of the record before the current guess; where it is not flat (it lies on
@@ -215,7 +225,7 @@ def _coarse_contact(force: np.ndarray) -> _Coarse:
         window = force[start:index]
         level, noise = _median_and_sd(window)
         height = float(running[top] - level)
-        if not _is_flat(window, height):
+        if not _is_flat(window, height, steady):
             index = start
             continue
         noise = max(noise, least)
@@ -230,11 +240,16 @@ def _coarse_contact(force: np.ndarray) -> _Coarse:
         seen.add(index)
 
 
-def _is_flat(window: np.ndarray, height: float) -> bool:
-    """Whether the level of a window's halves differs by no more than noise, or a little of the excursion."""
+def _is_flat(window: np.ndarray, height: float, steady: int | None) -> bool:
+    """Whether the level of a window's halves differs by no more than noise, or a little of the excursion.
+
+    The noise of a half's level is that of a sample, or that of a mean of every so many of them.
+    """
     half = len(window) // 2
     change = abs(float(np.median(window[half:]) - np.median(window[:half])))
     noise = _difference_noise(window)
+    if steady is not None:
+        noise *= float(np.sqrt(min(1.0, steady / max(half, 1))))
     return change <= max(EXCEED_SD * noise, FLAT_FRACTION * abs(height))
 
 

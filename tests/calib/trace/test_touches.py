@@ -174,3 +174,25 @@ def test_a_force_that_fades_is_followed_to_its_end() -> None:
     force = LEVEL + load + 0.03 * np.random.default_rng(1).normal(size=640)
     done = condition(Trace(time, force, None, "made.csv", columns=COLUMNS), speed=SPEED)
     assert done.stroke_length_m == pytest.approx(0.032, abs=1e-3)
+
+
+def noisy(noise: float, depths: tuple[float, ...], loads: tuple[float, ...], seed: int) -> Conditioned:
+    """A cut whose force [N] is given at depths [mm], with noise [N]."""
+    load = np.interp(1e3 * np.where(CUT.time <= 2.6, 0.04 - CUT.height, 0.0), depths, loads)
+    force = LEVEL + load + noise * np.random.default_rng(seed).normal(size=640)
+    return condition(Trace(CUT.time, force, CUT.height, "made.csv", columns=COLUMNS))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_slow_rise_is_no_baseline(seed: int) -> None:
+    """Of a hard core under soft flesh, with much noise, contact is where the flesh is met."""
+    done = noisy(0.6, (0.0, 12.0, 13.0, 20.0, 21.0, 32.0), (0.0, 5.0, 30.0, 30.0, 6.0, 6.0), seed)
+    assert done.onset_s == pytest.approx(1.0, abs=max(0.06, 3.0 * done.onset_sd_s))
+    assert done.onset_sd_s < 0.15
+
+
+def test_a_twentieth_of_the_peak_in_noise_is_no_reason_to_refuse() -> None:
+    """The rise from which contact is told is not taken for noise."""
+    for seed in range(6):
+        done = noisy(0.35, (0.0, 3.0, 32.0), (0.0, 4.0, 7.0), seed)
+        assert done.onset_s == pytest.approx(1.0, abs=3.0 * done.onset_sd_s)
