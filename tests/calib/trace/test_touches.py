@@ -193,6 +193,8 @@ def test_a_slow_rise_is_no_baseline(seed: int) -> None:
 
 def test_a_twentieth_of_the_peak_in_noise_is_no_reason_to_refuse() -> None:
     """The rise from which contact is told is not taken for noise."""
+    depths = np.linspace(0.0, 32.0, 33)
     for seed in range(6):
-        done = noisy(0.35, (0.0, 3.0, 32.0), (0.0, 4.0, 7.0), seed)
+        done = noisy(0.6, tuple(depths), tuple(12.0 * (depths / 32.0) ** 1.5), seed)
         assert done.onset_s == pytest.approx(1.0, abs=3.0 * done.onset_sd_s)
+        assert done.peak_N == pytest.approx(12.0, rel=0.05)
