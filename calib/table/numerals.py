@@ -105,7 +105,8 @@ def styles_of(columns: Mapping[str, Sequence[str]], decimal: str | None = None) 
         mark = next(iter(own))
         other = "," if mark == "." else "."
         grouped = any(other in cell for cell in columns[name])
-        if mark == "," or grouped or any(_SPACED.search(cell) for cell in columns[name][:1000]):
+        printed = any(_SPACED.search(cell) or not cell.isascii() for cell in columns[name][:1000])
+        if mark == "," or grouped or printed:
             found[name] = Style(mark, grouped)
     return found
 

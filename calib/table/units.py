@@ -204,12 +204,15 @@ class NamedUnit:
 
 _BRACKETED = re.compile(r"(.*?\S)[\s_]*[\[({<]\s*([^\[\](){}<>]{1,20}?)\s*[\])}>]\s*")
 _SET_OFF = re.compile(r"(.*?\S)\s*(?:,|/|\b(?:in|en)\b)\s*([^\s,]{1,15})")
+_BEHIND_POINTS = re.compile(r"(.*?[^\s.])\.\.+([^\s.]{1,15})\.*|([^.]*[^\s.])\.([^\s.]{1,15})")
+"""Names as R writes those with brackets or blanks in them: ``Force..N.`` and ``Force.N``."""
 _LAST_WORD = re.compile(r"(.*[^\s_])[\s_]+([^\s_]{1,15})")
 _JOINED = re.compile(
     r"(.*(?i:force|load|time|depth|displacement|position|stroke|extension|distance|travel|height))"
-    r"(N|kN|KN|mN|Sec|S|ms|Ms|mm|Mm|cm|Cm|M)"
+    r"(N|Newtons?|kN|KN|mN|Sec|Seconds?|S|ms|Ms|MS|mm|Mm|MM|cm|Cm|CM|M)"
 )
-_CAPITAL = {"KN": "kN", "Sec": "s", "S": "s", "Ms": "ms", "Mm": "mm", "Cm": "cm", "M": "m"}
+_CAPITAL = {"KN": "kN", "Sec": "s", "S": "s", "Ms": "ms", "MS": "ms", "Mm": "mm", "MM": "mm", "Cm": "cm", "CM": "cm"}
+_CAPITAL |= {"M": "m"}
 """Units as they are joined to a quantity, such as ``ForceN`` and ``timeSec``, and those that got a capital there."""
 _NO_UNIT = re.compile(
     r"[xyzXYZ]|\d+|raw|filtered|filt|corrected|primary|tared|max|mean|avg|average|abs|left|right|up|down|measured|actual|smoothed",
@@ -233,6 +236,9 @@ def split_unit(name: str) -> NamedUnit:
         found = pattern.fullmatch(name)
         if found and not found.group(1).endswith("/") and _is_last_word(found.group(2)):
             return NamedUnit(found.group(1), found.group(2))
+    found = _BEHIND_POINTS.fullmatch(name)
+    if found and _is_last_word(found[2] or found[4]):
+        return NamedUnit(found[1] or found[3], found[2] or found[4])
     joined = _JOINED.fullmatch(name)
     return NamedUnit(joined[1], _CAPITAL.get(joined[2], joined[2])) if joined else NamedUnit(name, "")
 

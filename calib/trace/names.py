@@ -38,7 +38,8 @@ _STEMS = {
 _DEPTH = _STEMS["position"][1]
 _MEASURED = "actual|act|current|measured|meas"
 _EITHER_WAY = re.compile(
-    rf"(({_MEASURED}|robot|flange|eef|ee|end_effector|knife|tool|tcp|blade)_)*(z|height|position|pos|pos(e|ition)?_z)"
+    rf"(({_MEASURED}|robot|flange|eef|ee|end_effector|knife|tool|tcp|blade)_)*(z|height|position|pos|pos(e|ition)?_z|"
+    rf"z_(position|pos|height|axis)|gap)"
     rf"(_({_MEASURED}))*|(.*_)?(crosshead|cross_head|traverse|axial|actuator|ram|piston|machine)_(position|pos|absolute)|s"
 )
 """Names of the knife's place that say nothing of the direction in which it is counted, which the force then tells. They
@@ -77,7 +78,7 @@ _NOT_MEASURED = re.compile(
 )
 """Words in the name of a column that is commanded, or made of measured ones: such a column is never chosen unasked."""
 _JOINT_TORQUES = re.compile(
-    r"^(base|knife)_f|(^|_)[ok]_f_ext|external_wrench|ext(ernal)?_wrench|wrench_ext|external_force|(^|_)ext_force|"
+    r"^(base|knife)_f([xyz]|_?ext)?(_|$)|(^|_)[ok]_f_ext|external_wrench|ext(ernal)?_wrench|wrench_ext|external_force|(^|_)ext_force|"
     r"(^|_)force_ext|(^|_)f_ext|(wrench|force)_est|est(imated)?_(wrench|force)|actual_tcp_force|cartesian_(wrench|force)|"
     r"endpoint_state_wrench"
 )

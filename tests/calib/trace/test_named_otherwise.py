@@ -10,6 +10,7 @@ import pytest
 
 from calib.errors import TraceError
 from calib.trace.conditioning import Conditioned, condition
+from calib.trace.names import from_joint_torques
 from calib.trace.trace import Trace, read_trace
 from tests.calib.made_cuts import made_cut, plain_rows, text_of
 
@@ -55,6 +56,8 @@ UP, DOWN = 1e3 * CUT.height, CUT.depth_mm
         ("actual_position_mm", UP, "height"),
         ("tcp_pose_z_mm", UP, "height"),
         ("s [mm]", DOWN, "depth"),
+        ("Z Position (mm)", UP, "height"),
+        ("Gap [mm]", UP, "height"),
     ],
 )
 def test_the_force_tells_how_a_place_is_counted(tmp_path: Path, name: str, place: np.ndarray, kind: str) -> None:
@@ -79,6 +82,10 @@ def test_a_place_whose_name_says_how_it_is_counted_goes_before_another(tmp_path:
         "s;N;mm",
         "seconds;Force (N);Stroke (mm)",
         "sec;Force (N);Stroke (mm)",
+        "Time..s.;Force..N.;Stroke..mm.",
+        "Time.s;Force.N;Stroke.mm",
+        "timeSec;forceNewton;strokeMm",
+        "TimeS;ForceN;StrokeMM",
     ],
 )
 def test_further_names_of_time_force_and_way(tmp_path: Path, header: str) -> None:
@@ -208,3 +215,18 @@ def test_units_that_change_within_a_column_are_none(tmp_path: Path) -> None:
         read(tmp_path, "\n".join(["time_s,Force", *body]))
     with pytest.raises(TraceError, match="'3004 mN' is not a number"):
         read(tmp_path, "\n".join(["time_s,Force", *body]), force_col="Force=N")
+
+
+def test_a_printed_minus_is_one(tmp_path: Path) -> None:
+    """U+2212, in a column that needs nothing else."""
+    body = [(t, f"{float(f) - 5.0:.4f}".replace("-", "\u2212"), z) for t, f, z in plain_rows(CUT)]
+    is_the_cut(read(tmp_path, text_of(HEADER, body)))
+
+
+@pytest.mark.parametrize(
+    ("name", "estimated"),
+    [("knife_force_N", False), ("base_force_N", False), ("knife_Fz_N", True), ("base_Fz_N", True), ("base_fx", True)],
+)
+def test_a_force_on_a_knife_is_no_estimate_of_an_arm(name: str, estimated: bool) -> None:
+    """Only the columns of libfranka are called so."""
+    assert from_joint_torques(name) == estimated
