@@ -78,7 +78,7 @@ _NOT_MEASURED = re.compile(
 )
 """Words in the name of a column that is commanded, or made of measured ones: such a column is never chosen unasked."""
 _JOINT_TORQUES = re.compile(
-    r"^(base|knife)_f([xyz]|_?ext)?(_|$)|(^|_)[ok]_f_ext|external_wrench|ext(ernal)?_wrench|wrench_ext|external_force|(^|_)ext_force|"
+    r"^base_f|^knife_f([xyz]|_?ext)?(_|$)|(^|_)[ok]_f_ext|external_wrench|ext(ernal)?_wrench|wrench_ext|external_force|(^|_)ext_force|"
     r"(^|_)force_ext|(^|_)f_ext|(wrench|force)_est|est(imated)?_(wrench|force)|actual_tcp_force|cartesian_(wrench|force)|"
     r"endpoint_state_wrench"
 )

@@ -225,7 +225,7 @@ def test_a_printed_minus_is_one(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "estimated"),
-    [("knife_force_N", False), ("base_force_N", False), ("knife_Fz_N", True), ("base_Fz_N", True), ("base_fx", True)],
+    [("knife_force_N", False), ("blade_force_N", False), ("knife_Fz_N", True), ("base_Fz_N", True), ("base_fx", True)],
 )
 def test_a_force_on_a_knife_is_no_estimate_of_an_arm(name: str, estimated: bool) -> None:
     """Only the columns of libfranka are called so."""
