@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from calib.errors import TraceError
+from calib.trace.contact_onset import quantum
 from calib.trace.mending import noise_of, without_spikes
 from calib.trace.recorded import MIN_SAMPLES
-from calib.trace.standing import quantum, standing
+from calib.trace.standing import standing
 from calib.trace.sudden import CHANGE_PART, CHANGE_SD, steps_of
 from calib.trace.trace import Trace
 from mpm.arrays import FloatArray

@@ -42,6 +42,9 @@ and what the 2 is for: docs/theory.md, "Measured choices"."""
 HINGE_GRID = 200
 """Trial positions of the kink in each of the two passes of its search."""
 MOST_HINGE_VALUES = 10**7  # numbers of trial rises at a time: a record of millions of samples has more
+COARSE_SD = 2.0
+"""Noise standard deviations in the step of a force from which on a rise below it is not seen: half the time from the
+kink to the second step is then a standard uncertainty."""
 MAD_TO_SD = 1.4826
 """Standard deviation of a normal variable over its median absolute deviation."""
 MEDIAN_VARIANCE = np.pi / 2.0
@@ -181,6 +184,20 @@ def estimate_baseline(time: np.ndarray, force: np.ndarray, start: int, stop: int
     return Baseline(level, float(np.hypot(statistical, drift)), noise, inflation, slope, slope_sd, start, stop)
 
 
+def quantum(force: np.ndarray) -> float:
+    """The step in which a force counts [N]: the smallest difference of its values, of which all others are multiples.
+
+    Zero where there is none.
+    """
+    values = np.unique(force)
+    if len(values) < 3 or len(values) > len(force) / 2:
+        return 0.0
+    steps = np.diff(values)
+    step = float(np.median(steps[steps < 1.5 * steps.min()]))
+    off = np.abs(steps / step - np.round(steps / step))
+    return step if float(np.mean(off < 0.1)) > 0.95 else 0.0
+
+
 def first_sustained(mask: np.ndarray) -> int | None:
     """Index of the first of ``SUSTAIN`` consecutive true values, or None."""
     runs = np.convolve(mask.astype(int), np.ones(SUSTAIN, dtype=int), mode="valid") == SUSTAIN
@@ -279,7 +296,8 @@ def _no_contact_message(force: np.ndarray, coarse: _Coarse, source: str) -> str:
 def _hinge_onset(time: np.ndarray, force: np.ndarray, index: int, coarse: _Coarse) -> tuple[float, float]:
     """Kink of the flat-then-rising fit around a coarse onset and its standard uncertainty [s]."""
     baseline = estimate_baseline(time, force, coarse.start, index)
-    noise = max(baseline.noise_sd, FLOOR_FRACTION * coarse.height)
+    step = quantum(force)
+    noise = max(baseline.noise_sd, FLOOR_FRACTION * coarse.height, step / 12**0.5)
     high = max(HINGE_TOP_SD * noise, HINGE_TOP_FRACTION * coarse.height)
     high = _below_a_pause(force[index:] - baseline.level, noise, high)
     kinks = []
@@ -291,7 +309,11 @@ def _hinge_onset(time: np.ndarray, force: np.ndarray, index: int, coarse: _Coars
         kinks.append(_averaged_hinge(time[first:stop], force[first:stop], noise, baseline.inflation))
     (kink, variance), (other, _) = kinks
     dt = float(np.median(np.diff(time)))
-    return kink, float(np.sqrt(variance + dt**2 / 12.0 + (0.5 * (kink - other)) ** 2))
+    unseen = 0.0
+    if step > COARSE_SD * baseline.noise_sd:
+        second = first_sustained(force[index:] > baseline.level + 1.5 * step)
+        unseen = 0.5 * float(time[index + (second or 0)] - min(kink, time[index]))
+    return kink, float(np.sqrt(variance + dt**2 / 12.0 + (0.5 * (kink - other)) ** 2 + unseen**2))
 
 
 def _below_a_pause(rise: np.ndarray, noise: float, top: float) -> float:

@@ -10,7 +10,8 @@ import numpy as np
 
 from calib.errors import TraceError
 from calib.trace.clock import JUMP
-from calib.trace.standing import Standing, quantum, standing
+from calib.trace.contact_onset import quantum
+from calib.trace.standing import Standing, standing
 from calib.trace.trace import Trace
 
 HIDDEN_PEAK = 0.03

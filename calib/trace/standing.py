@@ -82,17 +82,3 @@ def _runs(force: np.ndarray, tolerance: float) -> list[tuple[int, int]]:
     change = np.flatnonzero(np.abs(np.diff(force)) > tolerance)
     starts, ends = np.r_[0, change + 1], np.r_[change, len(force) - 1]
     return [(int(a), int(b)) for a, b in zip(starts, ends, strict=True) if b > a]
-
-
-def quantum(force: np.ndarray) -> float:
-    """The step in which a force counts [N]: the smallest difference of its values, of which all others are multiples.
-
-    Zero where there is none.
-    """
-    values = np.unique(force)
-    if len(values) < 3 or len(values) > len(force) / 2:
-        return 0.0
-    steps = np.diff(values)
-    step = float(np.median(steps[steps < 1.5 * steps.min()]))
-    off = np.abs(steps / step - np.round(steps / step))
-    return step if float(np.mean(off < 0.1)) > 0.95 else 0.0

@@ -7,8 +7,8 @@ import numpy as np
 from calib.errors import TraceError
 from calib.io.wording import LONG, brief
 from calib.trace.clock import JUMP
+from calib.trace.contact_onset import quantum
 from calib.trace.mending import noise_of
-from calib.trace.standing import quantum
 from calib.trace.trace import Trace
 
 SIDE = 6

@@ -135,3 +135,16 @@ def test_the_noise_is_that_of_the_food_where_the_edge_comes_to_the_board() -> No
     board = np.where(between(2.4, 2.605), 500.0 * (CUT.time - 2.4), 0.0)
     done = conditioned(CUT.but(force=CUT.force + board))
     assert done.at_board and not said(done, "hardly varies")
+
+
+@pytest.mark.parametrize("step", [0.25, 0.5, 1.0])
+def test_contact_is_as_uncertain_as_the_steps_of_the_force_leave_it(step: float) -> None:
+    """A load that grows slowly is not seen below half a step; one that grows at once is."""
+    way = np.clip((CUT.time - 1.0) / 1.6, 0.0, None) * (CUT.time <= 2.6)
+    noise = 0.02 * np.random.default_rng(2).normal(size=640)
+    slow, fast = (
+        conditioned(CUT.but(force=np.round((3.0 + load + noise) / step) * step))
+        for load in (12.0 * way**2, 12.0 * np.minimum(20.0 * way, 1.0 - 0.2 * way) * (way > 0))
+    )
+    assert abs(slow.onset_s - 1.0) < 4.0 * slow.onset_sd_s
+    assert abs(fast.onset_s - 1.0) < 0.02 and fast.onset_sd_s < 0.02
