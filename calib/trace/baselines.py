@@ -45,9 +45,10 @@ RELEASE_SD = 4.0
 """The force is released when it stays within this many noise standard deviations of the baseline ..."""
 RELEASE_FRACTION = 0.05
 """... or below this fraction of the peak, whichever is higher: a baseline drifts during a cut."""
-UNLOADING_TIME, UNLOADING_PART, UNLOADING_FROM = 0.1, 0.1, 0.25
+UNLOADING_TIME, UNLOADING_PART, UNLOADING_FROM, UNLOADING_STEEP = 0.1, 0.1, 0.25, 0.01
 """A knife that turns is unloaded within this part of the time from contact to release, in steps of at least this part
-of the largest, from at least this part of the peak: the food that it leaves behind does not bear it any more."""
+of the largest, from at least this part of the peak. The largest step comes within the last part of that time: a load
+that fades, as of a round food, falls ever faster."""
 
 
 @dataclass(frozen=True)
@@ -216,7 +217,8 @@ def release_of(time: np.ndarray, tared: np.ndarray, contact: ContactOnset) -> tu
     gentle = np.flatnonzero(falls[first:at] < least)
     if len(gentle):
         turn = first + int(gentle[-1]) + 1
-        if falls[at] >= least and tared[turn] > UNLOADING_FROM * contact.peak:
+        at_once = at - turn <= max(2.0, UNLOADING_STEEP * (last + 1 - np.searchsorted(time, contact.onset)))
+        if at_once and falls[at] >= least and tared[turn] > UNLOADING_FROM * contact.peak:
             return float(time[turn + 1]), True
     return release, True
 

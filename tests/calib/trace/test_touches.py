@@ -167,11 +167,12 @@ def test_a_force_that_grows_until_the_knife_turns(cutoff: float | None, power: f
     assert done.curve[-1] > 0.95 * done.peak_N
 
 
-def test_a_force_that_fades_is_followed_to_its_end() -> None:
+@pytest.mark.parametrize("noise", [0.03, 1e-3])
+def test_a_force_that_fades_is_followed_to_its_end(noise: float) -> None:
     """A round food bears the knife less and less; that is no knife that turns."""
     time = np.arange(640) / RATE
     load = 12.0 * np.sqrt(np.clip(1.0 - ((time - 1.8) / 0.8) ** 2, 0.0, None))
-    force = LEVEL + load + 0.03 * np.random.default_rng(1).normal(size=640)
+    force = LEVEL + load + noise * np.random.default_rng(1).normal(size=640)
     done = condition(Trace(time, force, None, "made.csv", columns=COLUMNS), speed=SPEED)
     assert done.stroke_length_m == pytest.approx(0.032, abs=1e-3)
 
