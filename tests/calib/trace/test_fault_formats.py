@@ -1,6 +1,6 @@
 """Any fault in any format: the peak is right to 3 %, or a note says what was found, or one line refuses the record.
 
-The inputs are the same in every run; ``-m slow`` draws a thousand of them.
+The inputs are the same in every run; ``-m long`` draws a thousand of them.
 """
 
 from __future__ import annotations
