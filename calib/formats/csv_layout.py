@@ -25,6 +25,8 @@ MOST_BELOW, MOST_BETWEEN, FEW = 40, 20, 5
 """Lines below the last row, lines of words between rows, and rows by which it is told what a row is like."""
 _COMMENT_MARKS = ("%", "//", "!")
 """What stands before a header as before a comment, beside ``#``."""
+_RULE = re.compile(r"[-=+:|_]*|(u?int|float)(8|16|32|64)?|double|real|numeric|integer|string|str|text", re.IGNORECASE)
+"""A cell of a line that is drawn below names, or that has the types of columns."""
 _COMMENT = re.compile(r"(comments?|remarks?|notes?|bemerkung(en)?|kommentar|)", re.IGNORECASE)
 _NUMBER_OF_SPECIMEN = re.compile(r"[\s_#]\d+(?=\s*([\[(].*)?$)")
 """The number of a specimen in the name of a column, as in ``Load 2 (N)``."""
@@ -85,6 +87,7 @@ def layout_of(source: str, body: NumberedLines) -> Layout:
     if separator == " ":
         top = [(line, _names_with_blanks(text, width)) for line, text in body[: MOST_ABOVE + 2]]
         rows = [*top, *rows[len(top) :]]
+    rows = _without_rules(rows)
     head = _header(rows, width)
     if head is None:
         header, units, start = ([], [], 0) if _share(rows[0][1]) > 0.5 else (rows[0][1], [], 1)
@@ -158,6 +161,17 @@ def _split(line: str, separator: str) -> list[str]:
         return next(csv.reader([line], delimiter=separator), [])
     except csv.Error:
         return line.split(separator)
+
+
+def _without_rules(rows: NumberedRows) -> NumberedRows:
+    """The rows without lines of dashes and of types above the first numbers, as below the names in a report."""
+    until = next((k for k, (_, cells) in enumerate(rows[: MOST_ABOVE + 2]) if _share(cells) > 0.5), 0)
+    kept = [
+        (line, cells)
+        for line, cells in rows[:until]
+        if not any(cells) or not all(_RULE.fullmatch(cell.strip()) for cell in cells)
+    ]
+    return [*kept, *rows[until:]]
 
 
 def _names_with_blanks(text: str, width: int) -> list[str]:

@@ -208,7 +208,7 @@ _BEHIND_POINTS = re.compile(r"(.*?[^\s.])\.\.+([^\s.]{1,15})\.*|([^.]*[^\s.])\.(
 """Names as R writes those with brackets or blanks in them: ``Force..N.`` and ``Force.N``."""
 _LAST_WORD = re.compile(r"(.*[^\s_])[\s_]+([^\s_]{1,15})")
 _JOINED = re.compile(
-    r"(.*(?i:force|load|time|depth|displacement|position|stroke|extension|distance|travel|height))"
+    r"(.*(?i:force|load|time|elapsed|depth|displacement|position|stroke|extension|distance|travel|height))"
     r"(N|Newtons?|kN|KN|mN|Sec|Seconds?|S|ms|Ms|MS|mm|Mm|MM|cm|Cm|CM|M)"
 )
 _CAPITAL = {"KN": "kN", "Sec": "s", "S": "s", "Ms": "ms", "MS": "ms", "Mm": "mm", "MM": "mm", "Cm": "cm", "CM": "cm"}

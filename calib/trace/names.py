@@ -39,8 +39,9 @@ _DEPTH = _STEMS["position"][1]
 _MEASURED = "actual|act|current|measured|meas"
 _EITHER_WAY = re.compile(
     rf"(({_MEASURED}|robot|flange|eef|ee|end_effector|knife|tool|tcp|blade)_)*(z|height|position|pos|pos(e|ition)?_z|"
-    rf"z_(position|pos|height|axis)|gap)"
-    rf"(_({_MEASURED}))*|(.*_)?(crosshead|cross_head|traverse|axial|actuator|ram|piston|machine)_(position|pos|absolute)|s"
+    rf"z_(position|pos|height|axis)|gap|deformation|ext|lvdt)"
+    rf"(_({_MEASURED}))*|(.*_)?(crosshead|cross_head|traverse|axial|actuator|ram|piston|machine)_(position|pos|absolute)|"
+    r"(crosshead_)?separation|s"
 )
 """Names of the knife's place that say nothing of the direction in which it is counted, which the force then tells. They
 are looked for where no name of ``_STEMS`` is there."""
@@ -120,6 +121,8 @@ _FOREIGN = re.compile(
 )
 _OF_UNIT = {Quantity.TIME: "time", Quantity.FORCE: "force", Quantity.LENGTH: "displacement"}
 """What a column is called that has no name but its unit."""
+_OF_A_CELL = re.compile(r"(.*_)?(weight|mass)")
+"""What a load cell shows that is given in grams; looked for where no force is there."""
 LONGEST_NAME = 200
 """Letters from which on the name of a column means nothing."""
 
@@ -148,11 +151,12 @@ class Meaning:
 
 def stem_of(name: str) -> str:
     """Lower case, words joined by _; a capital after a small letter begins a word."""
-    apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", "_", name).lower()
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z]|[XYZ](?![A-Za-z]))", "_", name).lower()
     if not apart.isascii() or _FOREIGN.search(apart):
         apart = _FOREIGN.sub(lambda found: _WORDS[found.group()], apart)
     plain = "".join(c for c in unicodedata.normalize("NFKD", apart) if not unicodedata.combining(c))
     stem = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
+    stem = re.sub(r"_\d+_((default|fast|slow)_sample_rate|standardmessrate)$", "", stem)  # of HBM's catman
     return re.sub(r"^(latest|(run|data_set|dataset|test|specimen|probe)_\d+)_(?=[a-z])", "", stem)
 
 
@@ -167,7 +171,9 @@ def meaning(table: Table, name: str) -> Meaning:
         stem, usual = known
         return Meaning(stem, table.units.get(name, "") or usual)
     split = split_unit(name)
-    stem, named = stem_of(split.stem), split.text
+    within = split_unit(split.stem)  # a unit that is said twice
+    stem = within.stem if split.bracketed and unit_of(within.text) == unit_of(split.text) else split.stem
+    stem, named = stem_of(stem), split.text
     stated = table.units.get(name, "")
     if not stated:
         quantity = "" if named else _named_by_its_unit(table, name)
@@ -225,13 +231,17 @@ def fits(table: Table, name: str, role: str) -> bool:
 def fitting_else(table: Table, role: str) -> list[str]:
     """Columns that can have a role where no name and unit fit it.
 
-    They are times of the day and dates by any name, and the knife's place by a name that does not say in which
-    direction it is counted.
+    They are times of the day and dates by any name, the knife's place by a name that does not say in which direction
+    it is counted, and a weight in a unit of force.
     """
     if role == "time":
         return [name for name in table.clocks if name in table.columns and not not_measured(name)]
     if role == "position":
         return [name for name in table.columns if counted_either_way(table, name)]
+    if role == "force":
+        said = {name: meaning(table, name) for name in table.columns}
+        cells = [name for name in said if (unit := said[name].measure) and unit.fits("force")]
+        return [name for name in cells if _OF_A_CELL.fullmatch(said[name].stem) and not not_measured(name)]
     return []
 
 

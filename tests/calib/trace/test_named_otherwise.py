@@ -58,6 +58,9 @@ UP, DOWN = 1e3 * CUT.height, CUT.depth_mm
         ("s [mm]", DOWN, "depth"),
         ("Z Position (mm)", UP, "height"),
         ("Gap [mm]", UP, "height"),
+        ("Crosshead separation (mm)", 250.0 - DOWN, "height"),
+        ("Deformation [mm]", DOWN, "depth"),
+        ("Ext(mm)", DOWN, "depth"),
     ],
 )
 def test_the_force_tells_how_a_place_is_counted(tmp_path: Path, name: str, place: np.ndarray, kind: str) -> None:
@@ -84,6 +87,11 @@ def test_a_place_whose_name_says_how_it_is_counted_goes_before_another(tmp_path:
         "sec;Force (N);Stroke (mm)",
         "Time..s.;Force..N.;Stroke..mm.",
         "Time.s;Force.N;Stroke.mm",
+        "time_s [s];force_N [N];stroke_mm [mm]",
+        "Time  1 - default sample rate [s];Force [N];Stroke [mm]",
+        "Zeit  1 - Standardmessrate [s];Kraft [N];Weg [mm]",
+        "time_s;ForceZ_N;Stroke [mm]",
+        "Time;Force;Stroke\ns;N;mm\nFloat64;Float64;Float64",
         "timeSec;forceNewton;strokeMm",
         "TimeS;ForceN;StrokeMM",
     ],
@@ -230,3 +238,31 @@ def test_a_printed_minus_is_one(tmp_path: Path) -> None:
 def test_a_force_on_a_knife_is_no_estimate_of_an_arm(name: str, estimated: bool) -> None:
     """Only the columns of libfranka are called so."""
     assert from_joint_torques(name) == estimated
+
+
+def test_a_unit_that_is_said_twice_may_not_differ(tmp_path: Path) -> None:
+    """Nothing tells which of them is right."""
+    with pytest.raises(TraceError, match="no force column"):
+        read(tmp_path, text_of("time_s,force_N [mN],position_m", plain_rows(CUT)))
+
+
+@pytest.mark.parametrize("name", ["weight_g", "Mass (g)"])
+def test_a_weight_is_a_force_where_there_is_no_other(tmp_path: Path, name: str) -> None:
+    """A load cell shows grams; that of the specimen beside a force is none."""
+    body = [(t, f"{float(f) / 9.80665e-3:.3f}", z) for t, f, z in plain_rows(CUT)]
+    is_the_cut(read(tmp_path, text_of(f"time_s,{name},position_m", body)))
+    beside = [(*row, "120.0") for row in plain_rows(CUT)]
+    is_the_cut(read(tmp_path, text_of(f"{HEADER},{name}", beside)))
+
+
+@pytest.mark.parametrize(
+    ("before", "row", "behind"),
+    [
+        ("| time_s | force_N | position_m |\n|---|:--:|---|", "| {} | {} | {} |", ""),
+        (" time_s | force_N | position_m \n--------+---------+---------", " {} | {} | {} ", "(640 rows)"),
+        ("  time_s    force_N    position_m\n--------  ---------  ------------", "{:>8}  {:>9}  {:>12}", ""),
+    ],
+)
+def test_tables_that_are_drawn(tmp_path: Path, before: str, row: str, behind: str) -> None:
+    """Lines of dashes below the names, as in Markdown and as databases print them."""
+    is_the_cut(read(tmp_path, "\n".join([before, *(row.format(*cells) for cells in plain_rows(CUT)), behind])))
