@@ -49,6 +49,9 @@ UNLOADING_TIME, UNLOADING_PART, UNLOADING_FROM, UNLOADING_STEEP = 0.1, 0.1, 0.25
 """A knife that turns is unloaded within this part of the time from contact to release, in steps of at least this part
 of the largest, from at least this part of the peak. The largest step comes within the last part of that time: a load
 that fades, as of a round food, falls ever faster."""
+UNLOADING_TOP, UNLOADING_HIGH, UNLOADING_SLOPE = 0.9, 0.5, 4.0
+"""A knife that is unloaded more slowly turned where the force was last at this part of its largest of that time,
+which is at least this part of the peak, and the force changes by so many times less in as many samples of the cut."""
 
 
 @dataclass(frozen=True)
@@ -220,7 +223,29 @@ def release_of(time: np.ndarray, tared: np.ndarray, contact: ContactOnset) -> tu
         at_once = at - turn <= max(2.0, UNLOADING_STEEP * (last + 1 - np.searchsorted(time, contact.onset)))
         if at_once and falls[at] >= least and tared[turn] > UNLOADING_FROM * contact.peak:
             return float(time[turn + 1]), True
-    return release, True
+    return float(time[_steep_fall(tared, (int(np.searchsorted(time, contact.onset)), first, last), contact.peak)]), True
+
+
+def _steep_fall(tared: np.ndarray, places: tuple[int, int, int], peak: float) -> int:
+    """Index of the sample from which on a force falls to the baseline far more steeply than it changed before.
+
+    Args:
+        tared: Force above the baseline [N], shape (n,).
+        places: Indices of contact, of the first sample in which the fall may begin, and of the last loaded one.
+        peak: Largest force [N].
+
+    Returns:
+        The first sample of the fall; the one behind the last loaded sample where it is not so steep.
+    """
+    begin, first, last = places
+    near = tared[first : last + 1]
+    turn = first + int(np.flatnonzero(near >= UNLOADING_TOP * near.max())[-1])
+    steps = last + 1 - turn
+    before = tared[begin : turn + 1]
+    if turn == first or len(before) <= steps or tared[turn] < UNLOADING_HIGH * peak:
+        return last + 1
+    usual = float(np.max(np.abs(before[steps:] - before[:-steps])))
+    return turn + 1 if tared[turn] - tared[last + 1] > UNLOADING_SLOPE * usual else last + 1
 
 
 def trigger_contact(trace: Trace, force: np.ndarray) -> ContactOnset:

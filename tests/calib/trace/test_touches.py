@@ -167,6 +167,16 @@ def test_a_force_that_grows_until_the_knife_turns(cutoff: float | None, power: f
     assert done.curve[-1] > 0.95 * done.peak_N
 
 
+@pytest.mark.parametrize("duration", [0.02, 0.05, 0.1])
+def test_a_knife_that_is_unloaded_slowly(duration: float) -> None:
+    """The way in which it turns and the food springs back is no part of the stroke."""
+    time = np.arange(640) / RATE
+    load = np.interp(time, [1.0, 2.1, 2.6, 2.6 + duration], [0.0, 12.0, 9.6, 0.0])
+    force = LEVEL + load + 0.03 * np.random.default_rng(1).normal(size=640)
+    done = condition(Trace(time, force, None, "made.csv", columns=COLUMNS), speed=SPEED)
+    assert done.stroke_length_m == pytest.approx(0.032, abs=5e-4)
+
+
 @pytest.mark.parametrize("noise", [0.03, 1e-3])
 def test_a_force_that_fades_is_followed_to_its_end(noise: float) -> None:
     """A round food bears the knife less and less; that is no knife that turns."""
