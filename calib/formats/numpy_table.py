@@ -77,6 +77,8 @@ def _columns(held: dict[str, np.ndarray]) -> list[tuple[str, Cells]]:
             value = value.reshape(-1) if 1 in value.shape else value
             if value.ndim == 2 and value.shape[0] <= LONGEST_VECTOR < value.shape[1]:
                 value = value.T
-            cells = [str(cell) for cell in value] if value.dtype.kind == "U" and value.ndim == 1 else value
-            out.append((name, cells.astype(float) if value.dtype.kind == "b" else cells))
+            if value.dtype.kind == "U" and value.ndim == 1:
+                out.append((name, [str(cell) for cell in value]))
+            else:
+                out.append((name, value.astype(float) if value.dtype.kind == "b" else value))
     return out
