@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calib.material.cut_speed import END_SPEED, MACH, quasi_static_mach
 from calib.material.food import FoodSpec
 from calib.material.form import ASPECT_SPAN, open_shape, unusual_stroke
 from calib.material.properties import BOARD_FRICTION, BOARD_SUCTION, BOW
@@ -23,13 +24,6 @@ ZONE_PARTS = 8
 """Parts of the height or width of a small food that one process zone takes."""
 CELL_PER_ZONE = 0.75
 """Default cell over the process zone [-], which then spans 1.3 cells; the coarse grid has one cell to the zone."""
-MACH = 0.01
-"""Largest speed of the blade over that of the P-wave [-]; the coarse cut has twice of it."""
-FACE_MACH = 3e-4
-"""Largest speed at which the blade's faces move the food aside over that of the P-wave [-]: what decides how far a cut
-is from a slow one (docs/theory.md, "Time step and speed")."""
-END_SPEED = 0.5
-"""Part of its speed that a blade which is slow for its faces' sake keeps at the end of the stroke [-]."""
 CLEARANCE_ZONES = 1.0
 """Food that is likely left below the edge where a trace ends under load, in process zones."""
 HEIGHT_SPAN = 1.25
@@ -334,14 +328,6 @@ def with_other_particles(scene: Scene, k: int) -> Scene:
     along, across, _ = scene.numerics.grid_shift
     moved = ((along + 0.5) % 1.0 if scene.mirrors[0] else x, across, z)
     return replace(scene, numerics=replace(scene.numerics, seed=scene.numerics.seed + k, grid_shift=moved))
-
-
-def quasi_static_mach(knife: Knife, shape: Shape) -> float:
-    """Speed at which a blade cuts as if slowly, over the P-wave's [-]: the less, the thicker its wedge.
-
-    A food that is cut off its middle tips under the edge, as nothing but its inertia holds it. So that one stays fast.
-    """
-    return MACH if shape.cut else min(MACH, FACE_MACH / math.tan(knife.angle / 2))
 
 
 def cut_scene(

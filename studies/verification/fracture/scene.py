@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from calib.material.scene import quasi_static_mach
+from calib.material.cut_speed import quasi_static_mach
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.scene.material import Material
 from mpm.scene.shapes import Shape

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from calib.material.cut_speed import END_SPEED
 from calib.material.food import load_food
 from calib.material.knife import load_knife
-from calib.material.scene import END_SPEED, cut_scene
+from calib.material.scene import cut_scene
 from mpm.scene.shapes import Shape
 
 HALF = Shape("half_cylinder", 0.08, 0.06, 0.05)
