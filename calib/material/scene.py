@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.material.cut_speed import END_SPEED, MACH, quasi_static_mach
+from calib.material.cut_speed import END_SPEED, MACH, quasi_static_mach, screening_mach
 from calib.material.food import FoodSpec
 from calib.material.form import ASPECT_SPAN, open_shape, unusual_stroke
 from calib.material.properties import BOARD_FRICTION, BOARD_SUCTION, BOW
@@ -353,7 +353,7 @@ def cut_scene(
             force depends on it needs; its simulated speed is set here.
         dx: Cell [m]; by default three quarters of the process zone, which grows with larger ones: a screening version
             has the same edge.
-        coarse: Screening version of the scene: one cell to the process zone, twice the speed.
+        coarse: Screening version of the scene: one cell to the process zone, and up to twice the speed.
         seed: Seed of the particles.
 
     Returns:
@@ -368,7 +368,7 @@ def cut_scene(
     mach = quasi_static_mach(knife, shape)
     thick = mach < MACH
     if coarse:
-        cell, mach = cell / CELL_PER_ZONE, 2 * mach
+        cell, mach = cell / CELL_PER_ZONE, screening_mach(food, knife, shape)
     filled = food.to_scene_food()
     known = {name: food.value(p) for name, p in OF_BOARD.items() if shape.stands or p != BOARD_SUCTION}
     board = Board(**{name: value for name, value in known.items() if value is not None})
