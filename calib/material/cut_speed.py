@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from calib.material.food import FoodSpec
+from calib.material.properties import BOW
 from mpm.scene import Knife
 from mpm.scene.shapes import Shape
 
@@ -13,9 +14,6 @@ MACH = 0.01
 FACE_MACH = 3e-4
 """Largest speed at which the blade's faces move the food aside over that of the P-wave [-]: what decides how far a cut
 is from a slow one (docs/theory.md, "Time step and speed")."""
-CRACK_AHEAD = 700.0
-"""E times the height over R from which on a crack runs so far ahead of a thin blade that screening at twice the speed
-is off by more than a twentieth of the peak [-] (docs/theory.md, "Time step and speed")."""
 END_SPEED = 0.5
 """Part of its speed that a blade which is slow for its faces' sake keeps at the end of the stroke [-]."""
 
@@ -31,17 +29,17 @@ def quasi_static_mach(knife: Knife, shape: Shape) -> float:
 def screening_mach(food: FoodSpec, knife: Knife, shape: Shape) -> float:
     """Speed of a screening run over the P-wave's [-]: twice that of a default one, or the same.
 
-    Ahead of a thin blade the crack runs through a stiff food, and its halves part as slowly as their inertia lets them.
-    At twice the speed the edge overtakes that crack. A thick blade is slower already, for its faces' sake.
+    A food that may rest on its ends (:data:`calib.material.properties.BOW`) bends under the blade as slowly as its
+    inertia lets it, and twice the speed leaves it no time to. A thick blade is slower already, for its faces' sake.
 
     Args:
-        food: The food, at its usual values.
+        food: The food.
         knife: The blade.
         shape: The specimen.
 
     Returns:
         The speed.
     """
-    mach, usual = quasi_static_mach(knife, shape), food.to_scene_food().material
-    ahead = mach == MACH and not shape.cut and usual.E * shape.height > CRACK_AHEAD * usual.R
-    return mach if ahead else 2 * mach
+    mach = quasi_static_mach(knife, shape)
+    bends = food.value(BOW) is not None and mach == MACH and not shape.cut
+    return mach if bends else 2 * mach
