@@ -193,8 +193,8 @@ def behind_the_cut(trace: Trace, tared: np.ndarray, contact: ContactOnset) -> np
     return np.arange(len(tared) - count, len(tared)) if still and level < 0.0 else np.empty(0, dtype=int)
 
 
-def release_of(time: np.ndarray, tared: np.ndarray, contact: ContactOnset) -> tuple[float, bool]:
-    """Time from which on the food no longer bears the knife, and whether the record has it.
+def release_of(time: np.ndarray, tared: np.ndarray, contact: ContactOnset) -> tuple[float, bool, bool]:
+    """Time from which on the food no longer bears the knife, whether the record has it, and whether the knife turned.
 
     The force is then back at the baseline for good. Where it got there at once, the knife turned when it began to fall.
 
@@ -204,14 +204,15 @@ def release_of(time: np.ndarray, tared: np.ndarray, contact: ContactOnset) -> tu
         contact: Its contact.
 
     Returns:
-        The time of the first such sample [s]; the end of the record, and False, where the force is not released.
+        The time of the first such sample [s]; the end of the record, and False, where the force is not released;
+        whether it fell at once, which is no part of the cut.
     """
     noise = contact.baseline.noise_sd
     limit = max(RELEASE_SD * noise, RELEASE_FRACTION * contact.peak)
     after_last = first_sustained((tared > limit)[::-1])
     last = len(tared) - 1 - (after_last or 0)
     if last >= len(tared) - SUSTAIN:
-        return float(time[-1]), False
+        return float(time[-1]), False, False
     release = float(time[last + 1])
     falls = tared[:-1] - tared[1:]
     first = int(np.searchsorted(time, release - UNLOADING_TIME * (release - contact.onset)))
@@ -222,8 +223,9 @@ def release_of(time: np.ndarray, tared: np.ndarray, contact: ContactOnset) -> tu
         turn = first + int(gentle[-1]) + 1
         at_once = at - turn <= max(2.0, UNLOADING_STEEP * (last + 1 - np.searchsorted(time, contact.onset)))
         if at_once and falls[at] >= least and tared[turn] > UNLOADING_FROM * contact.peak:
-            return float(time[turn + 1]), True
-    return float(time[_steep_fall(tared, (int(np.searchsorted(time, contact.onset)), first, last), contact.peak)]), True
+            return float(time[turn + 1]), True, True
+    end = _steep_fall(tared, (int(np.searchsorted(time, contact.onset)), first, last), contact.peak)
+    return float(time[end]), True, end <= last
 
 
 def _steep_fall(tared: np.ndarray, places: tuple[int, int, int], peak: float) -> int:

@@ -172,7 +172,7 @@ def condition(
     into, deep = (int(np.searchsorted(trace.time, contact.onset)), int(np.argmax(axis.stroke >= axis.end * (1 - 1e-9))))
     out = out_of_the_food(trace, contact)
     sudden = sudden_changes(trace, tared, (into, deep), out, held.sound)
-    sound = held.sound & ~(axis.released & (axis.stroke >= axis.end * (1 - 1e-9)))
+    sound = held.sound & ~(axis.turned & (axis.stroke >= axis.end * (1 - 1e-9)))
     grid, curve = _on_grid(trace.time, axis.stroke, tared, (contact.onset, axis.end), sound)
     length = float(grid[-1])
     samples = int(np.count_nonzero((axis.stroke >= 0.0) & (axis.stroke <= length)))

@@ -53,7 +53,7 @@ class StrokeAxis:
         source: Where it comes from: ``position``, ``speed`` or ``height``.
         warnings: What a reader should know of it, one sentence each.
         at_board: Whether it ends where the force says that the edge is on the board.
-        released: Whether it ends with the first sample in which the food no longer bears the knife.
+        turned: Whether it ends with the first sample behind a knife that turned under load.
     """
 
     stroke: np.ndarray
@@ -61,7 +61,7 @@ class StrokeAxis:
     source: str
     warnings: tuple[str, ...] = ()
     at_board: bool = False
-    released: bool = False
+    turned: bool = False
 
 
 def end_of_descent(trace: Trace) -> int:
@@ -143,7 +143,7 @@ def _at_constant_speed(
     trace: Trace, tared: np.ndarray, contact: ContactOnset, speed: float | None, height: float | None
 ) -> StrokeAxis:
     """The time since contact at a known speed, or at that which goes through the food from contact to release."""
-    release, released = release_of(trace.time, tared, contact)
+    release, released, turned = release_of(trace.time, tared, contact)
     warnings: tuple[str, ...] = ()
     if speed is not None:
         rate, source = speed, "speed"
@@ -157,7 +157,7 @@ def _at_constant_speed(
             "inherits that guess",
         )
     stroke, end = rate * (trace.time - contact.onset), rate * (release - contact.onset)
-    return StrokeAxis(stroke, end, source, warnings, released=released)
+    return StrokeAxis(stroke, end, source, warnings, turned=turned)
 
 
 def stroke_in_food(

@@ -187,6 +187,15 @@ def test_a_force_that_fades_is_followed_to_its_end(noise: float) -> None:
     assert done.stroke_length_m == pytest.approx(0.032, abs=1e-3)
 
 
+def test_the_sample_in_which_a_fading_force_ends_is_part_of_the_cut() -> None:
+    """In a record of few samples the force before it would be held to the end of the stroke."""
+    time = np.arange(96) / 30.0
+    load = np.interp(time, [1.0, 1.8, 2.6], [0.0, 12.0, 0.0])
+    force = LEVEL + load + 0.03 * np.random.default_rng(1).normal(size=96)
+    done = condition(Trace(time, force, None, "made.csv", columns=COLUMNS), speed=SPEED)
+    assert done.curve[-1] == pytest.approx(0.0, abs=0.05 * done.peak_N)  # the filter rounds the corner
+
+
 def noisy(noise: float, depths: tuple[float, ...], loads: tuple[float, ...], seed: int) -> Conditioned:
     """A cut whose force [N] is given at depths [mm], with noise [N]."""
     load = np.interp(1e3 * np.where(CUT.time <= 2.6, 0.04 - CUT.height, 0.0), depths, loads)
