@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 
-from calib.trace.trace import Trace
+from calib.trace.conditioning import condition
+from calib.trace.trace import Trace, read_trace
 
 RATE, LEVEL, PEAK, CONTACT_S, END_S, STROKE_M = 200.0, 3.0, 12.0, 1.0, 2.6, 0.032
 """Samples a second, level before contact [N], largest force above it [N], contact and end of the stroke [s], stroke."""
@@ -54,3 +58,18 @@ def text_of(header: str, rows: Sequence[Sequence[object]], separator: str = ",")
 def plain_rows(cut: Cut) -> list[tuple[str, str, str]]:
     """Time [s], force [N] and height [m] with four decimals."""
     return [(f"{t:.4f}", f"{f:.4f}", f"{z:.5f}") for t, f, z in zip(cut.time, cut.force, cut.height, strict=True)]
+
+
+def read(folder: Path, text: str | bytes, name: str = "cut.csv", **how: Any) -> Trace:
+    """The trace in a text."""
+    path = folder / name
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return read_trace(path, **how)
+
+
+def same_cut(trace: Trace) -> None:
+    """Contact, stroke and peak are those of the cut that was made up."""
+    done, true = condition(trace), condition(made_cut().trace())
+    assert done.onset_s == pytest.approx(true.onset_s, abs=0.005)
+    assert done.peak_N == pytest.approx(true.peak_N, rel=0.002)
+    assert done.stroke_length_m == pytest.approx(true.stroke_length_m, abs=2e-4)

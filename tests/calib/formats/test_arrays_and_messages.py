@@ -12,20 +12,12 @@ from scipy.io import savemat
 
 from calib.errors import TraceError
 from calib.trace.conditioning import condition
-from calib.trace.trace import Trace, read_trace
-from tests.calib.made_cuts import made_cut
+from calib.trace.trace import read_trace
+from tests.calib.made_cuts import made_cut, same_cut
 
 CUT = made_cut()
 TRUE = condition(CUT.trace())
 COLUMNS = {"time_s": CUT.time, "force_N": CUT.force, "position_m": CUT.height}
-
-
-def same_cut(trace: Trace) -> None:
-    """Contact, stroke and peak are those of the cut."""
-    done = condition(trace)
-    assert done.onset_s == pytest.approx(TRUE.onset_s, abs=0.005)
-    assert done.peak_N == pytest.approx(TRUE.peak_N, rel=0.002)
-    assert done.stroke_length_m == pytest.approx(TRUE.stroke_length_m, abs=2e-4)
 
 
 def test_arrays_of_numpy(tmp_path: Path) -> None:

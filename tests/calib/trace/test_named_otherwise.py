@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,20 +10,13 @@ import pytest
 from calib.errors import TraceError
 from calib.trace.conditioning import Conditioned, condition
 from calib.trace.names import from_joint_torques
-from calib.trace.trace import Trace, read_trace
-from tests.calib.made_cuts import made_cut, plain_rows, text_of
+from calib.trace.trace import Trace
+from tests.calib.made_cuts import made_cut, plain_rows, read, text_of
 
 CUT = made_cut()
 TRUE = condition(CUT.trace())
 HEADER = "time_s,force_N,position_m"
 DAY = [f"17:33:{33 + t:06.3f}" for t in CUT.time]
-
-
-def read(folder: Path, text: str | bytes, name: str = "cut.csv", **how: Any) -> Trace:
-    """The trace in a text."""
-    path = folder / name
-    path.write_bytes(text.encode() if isinstance(text, str) else text)
-    return read_trace(path, **how)
 
 
 def is_the_cut(trace: Trace) -> Conditioned:

@@ -17,21 +17,14 @@ import pytest
 
 from calib.errors import TraceError
 from calib.trace.conditioning import Conditioned, condition
-from calib.trace.trace import Trace, read_trace
+from calib.trace.trace import Trace
 from cutcal import Calibration
-from tests.calib.made_cuts import made_cut, plain_rows, text_of
+from tests.calib.made_cuts import made_cut, plain_rows, read, text_of
 
 CUT = made_cut()
 TRUE = condition(CUT.trace())
 EPOCH = 1_700_000_000
 HEADER = "time_s,force_N,position_m"
-
-
-def read(folder: Path, text: str | bytes, name: str = "cut.csv", **how: Any) -> Trace:
-    """The trace in a text."""
-    path = folder / name
-    path.write_bytes(text.encode() if isinstance(text, str) else text)
-    return read_trace(path, **how)
 
 
 def is_the_cut(trace: Trace) -> Conditioned:
