@@ -46,6 +46,9 @@ MID_LENGTH = 0.5
 FAR_PER_HEIGHT = 0.25
 """Distance from the cut from which on there are fewer particles, over the height (docs/theory.md, "Measured
 choices")."""
+DAMPER_MASS = 0.4
+"""Mass of the dampers of a cut over the food's [-], so that a blade that rubs does not make the halves chatter
+(docs/theory.md, "Dampers")."""
 
 
 SizeRange = tuple[float, float, float]
@@ -380,5 +383,5 @@ def cut_scene(
         board=board,
         motion=replace(motion, stroke=min(motion.stroke, deepest), mach=mach, end_speed=END_SPEED if thick else 1.0),
         edge=EdgeLaw(zone=zone, dent_width=own),
-        numerics=Numerics(dx=cell, far=FAR_PER_HEIGHT * shape.height, seed=seed),
+        numerics=Numerics(dx=cell, far=FAR_PER_HEIGHT * shape.height, seed=seed, damper_mass=DAMPER_MASS),
     )

@@ -110,6 +110,10 @@ CONSTANTS = (
         "numerical: keeps the centre of a particle that is squeezed flat inside the food",
     ),
     MethodConstant(
+        "mass of the dampers", "numerics", "damper_mass", (0.5, 2.0),
+        "numerical: enough that halves which rub do not chatter; with it they lose about as much as tissue",
+    ),
+    MethodConstant(
         "process zone of a food without strength", "material", "cohesive_zone", (0.5, 2.0),
         "assumed, where the food has no strength (materials.yaml has one for every food)",
         where=lambda scene: scene.food.material.strength is None,

@@ -3,12 +3,13 @@
 import taichi as ti
 
 from mpm.kernels.crack import ALL_VISIBLE, IN_CONTACT, field_offsets
+from mpm.kernels.dampers import book_dampers, drag_damper
 from mpm.kernels.surface_contact import near_tool, surface_contact
 from mpm.state.accessors import step_size
 from mpm.state.loops import block_range, locate_active, node_box, repetitions
 from mpm.state.state import NODE_ROWS, PARTS
 from mpm.state.stencil import base_node, bspline_weights, in_window, node_index
-from mpm.state.tables import COUNT, INV_DX
+from mpm.state.tables import COUNT, DAMPER_MASS, INV_DX
 
 
 @ti.func
@@ -19,16 +20,24 @@ def grid_to_particles(s: ti.template(), cut: ti.template()):
         first, last, thread = block_range(s, c, part)
         if mine and first < last:
             dt, w = step_size(s, c), node_box(s, c, NODE_ROWS)
+            taken = ti.cast(0.0, float)
             for p in range(first * s.lanes, ti.min(last * s.lanes, s.size[c, COUNT])):
-                g2p_particle(s, c, p, thread, dt, w)
+                taken += g2p_particle(s, c, p, thread, dt, w)
+            book_dampers(s, c, part, taken)
 
 
 @ti.func
 def g2p_particle(s: ti.template(), cut, p, thread, dt, window):
-    """One particle from the grid; one that has left it stays where it is, and the run ends at the next output."""
+    """One particle from the grid; one that has left it stays where it is, and the run ends at the next output.
+
+    Returns:
+        Energy that its damper takes, as :func:`mpm.kernels.dampers.drag_damper` has it.
+    """
+    taken = ti.cast(0.0, float)
     base, fx = base_node(s, cut, s.x[cut, p])
     if in_window(base, window) > 0:
-        update_particle(s, cut, p, thread, base, fx, dt)
+        taken = update_particle(s, cut, p, thread, base, fx, dt)
+    return taken
 
 
 @ti.func
@@ -37,6 +46,9 @@ def update_particle(s: ti.template(), cut, p, thread, base, fx, dt):
 
     Contact corrects the velocity that the next transfer hands on, not the position: moving the particle as well would
     let the surface slip through the material without straining it.
+
+    Returns:
+        Energy that its damper takes, as :func:`mpm.kernels.dampers.drag_damper` has it.
     """
     w = bspline_weights(fx)
     code, lowest = s.visibility[cut, p], node_index(s, cut, base[0], base[1], base[2])
@@ -65,12 +77,16 @@ def update_particle(s: ti.template(), cut, p, thread, base, fx, dt):
     cx, cy, cz = slope * (cx - fx[0] * u4), slope * (cy - fx[1] * u4), slope * (cz - fx[2] * u4)
     s.C[cut, p, 0], s.C[cut, p, 1], s.C[cut, p, 2] = cx, cy, cz
     at = s.x[cut, p] + dt * u
+    taken = ti.cast(0.0, float)
+    if s.par[cut, DAMPER_MASS] > 0:
+        u, taken = drag_damper(s, cut, p, u, dt)
     if ti.static(not s.nodal):
         if near_tool(s, cut, p, at):
             u = surface_contact(s, cut, p, dt, u, at)
             s.visibility[cut, p] = code | IN_CONTACT
     s.v[cut, p] = u
     s.x[cut, p] = at
+    return taken
 
 
 @ti.func

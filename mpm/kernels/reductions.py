@@ -13,6 +13,7 @@ from mpm.kernels.constitutive.laws import (
     unit,
 )
 from mpm.kernels.crack import IN_CONTACT
+from mpm.kernels.dampers import damper_momentum_and_energy
 from mpm.kernels.membrane import membrane_energy
 from mpm.state.accessors import deformation_gradient, velocity_gradient
 from mpm.state.loops import block_range, locate, repetitions
@@ -132,7 +133,7 @@ def take_sum(s: ti.template(), field: ti.template(), cut, row):
 
 @ti.func
 def momentum_and_energy(s: ti.template(), cut, p):
-    """Momentum (3), kinetic and elastic energy of a particle [N s, J].
+    """Momentum (3), kinetic and elastic energy of a particle, momentum (3) of its damper [N s, J].
 
     The kinetic energy is that of the motion, without what contact has just given: the stress that will balance it has
     not acted yet. Food at rest on a board would else have the energy of the fall that the board stops in every step.
@@ -156,7 +157,9 @@ def momentum_and_energy(s: ti.template(), cut, p):
     given = s.contact_moment[cut, p, 0][3] if s.visibility[cut, p] & IN_CONTACT else 0.0
     kinetic = m * (0.5 * u.norm_sqr() - given + 0.125 * s.par[cut, DX] * s.par[cut, DX] * spin)
     energy = s.par[cut, VOLUME] * s.volume_ratio[cut, p] * (keep * dev + (keep if j > 1 else 1.0) * vol)
-    return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy])
+    damper = damper_momentum_and_energy(s, cut, p)
+    kinetic += damper[3]
+    return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy, damper[0], damper[1], damper[2]])
 
 
 @ti.func

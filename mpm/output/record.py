@@ -45,12 +45,13 @@ class ForceRecord:
         board: Force of the food on the board [N], shape (n, 3).
         gravity: Weight [N], shape (n, 3).
         momentum: Momentum of the food at the end of each interval [N s], shape (n, 3).
+        dampers: Momentum of its dampers at the end of each interval [N s], shape (n, 3).
         residual: Momentum balance that does not close [N], shape (n, 3).
-        kinetic: Kinetic energy of the motion, without what contact gave in the last step [J], shape (n,).
+        kinetic: Kinetic energy of the motion, dampers included, without what contact gave last [J], shape (n,).
         elastic: Elastic energy [J], shape (n,).
         plastic: Energy dissipated by J2 flow so far [J], shape (n,).
         damage: Energy dissipated by bulk damage so far [J], shape (n,).
-        viscous: Energy dissipated by the loss factor so far [J], shape (n,).
+        viscous: Energy dissipated by the loss factor and the dampers so far [J], shape (n,).
         friction: Energy that friction has taken so far [J], shape (n,); of particles that touch, so that of the
             ``nodal`` contact is not in it.
         parting: Energy that the cutting edge has taken so far [J], shape (n,): new surface, and the start of the cut.
@@ -96,6 +97,7 @@ class ForceRecord:
     board: np.ndarray
     gravity: np.ndarray
     momentum: np.ndarray
+    dampers: np.ndarray
     residual: np.ndarray
     kinetic: np.ndarray
     elastic: np.ndarray

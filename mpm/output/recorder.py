@@ -27,6 +27,7 @@ class Interval:
         slide: Way of the blade along its edge [m].
         time: Simulated time at its end [s].
         momentum: Of the food at its end [N s], shape (3,).
+        dampers: Momentum of its dampers at its end [N s], shape (3,).
         edge: Force of the food on the cutting edge [N], shape (3,).
         face: Force of the food on the blade's faces [N], shape (3,).
         board: Force of the food on the board [N], shape (3,).
@@ -36,7 +37,7 @@ class Interval:
         elastic: Elastic energy at its end [J].
         plastic: Energy that J2 flow has taken in it [J].
         damage: Energy that bulk damage has taken in it [J].
-        viscous: Energy that the loss factor has taken in it [J].
+        viscous: Energy that the loss factor and the dampers have taken in it [J].
         friction: Energy that friction has taken in it [J].
         parting: Energy that the cutting edge has taken in it [J].
         cohesion: Energy that ties across the cut plane have taken in it [J].
@@ -51,6 +52,7 @@ class Interval:
     slide: float
     time: float
     momentum: np.ndarray
+    dampers: np.ndarray
     edge: np.ndarray
     face: np.ndarray
     board: np.ndarray
@@ -120,8 +122,12 @@ class Recorder:
         setup, sums, pose = self._setup, parts.sums, parts.pose
         scene, images, height = setup.scene, setup.grid.images, setup.scene.food.shape.height
         mirror = np.array([0.0 if m else 1.0 for m in (*scene.mirrors, False)])
-        momentum = setup.to_scene_axes(parts.particles[None, row.MOMENTUM : row.KINETIC])[0] * images * mirror
-        before = self.intervals[-1].momentum if self.intervals else np.zeros(3)
+        momentum, dampers = (
+            setup.to_scene_axes(parts.particles[None, r : r + 3])[0] * images * mirror
+            for r in (row.MOMENTUM, row.DAMPER_MOMENTUM)
+        )
+        last = self.intervals[-1] if self.intervals else None
+        before = last.momentum + last.dampers if last else np.zeros(3)
         edge, face, board = (sums[r : r + 3] / span for r in (row.EDGE, row.FACE, row.BOARD))
         weight = np.array([0.0, 0.0, -self._material.rho * setup.seeds.total * images * scene.numerics.gravity])
         volume = images * setup.seeds.volume
@@ -131,11 +137,12 @@ class Recorder:
             slide=pose[row.EDGE_S],
             time=self.time,
             momentum=momentum,
+            dampers=dampers,
             edge=edge,
             face=face,
             board=board,
             gravity=weight,
-            residual=(momentum - before) / span - weight + edge + face + board,
+            residual=(momentum + dampers - before) / span - weight + edge + face + board,
             kinetic=parts.particles[row.KINETIC] * images,
             elastic=parts.particles[row.ELASTIC] * images,
             plastic=volume * sums[row.PLASTIC],
@@ -181,6 +188,7 @@ class Recorder:
             board=self._column("board"),
             gravity=self._column("gravity"),
             momentum=self._column("momentum"),
+            dampers=self._column("dampers"),
             residual=self._column("residual"),
             kinetic=self._column("kinetic"),
             elastic=self._column("elastic"),

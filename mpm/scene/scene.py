@@ -66,6 +66,8 @@ class Numerics:
             (:meth:`mpm.scene.material.Material.tie_strength`).
         layer_rows: Rows of a tie across the cut plane, each with the toughness of the layer that it lies in.
         least_gap: Least distance of a particle's centre from the food's surface that squeezing leaves [cells].
+        damper_mass: Mass of the Lanchester damper that each particle carries, over its own [-]
+            (:mod:`mpm.kernels.dampers`). It takes motion that comes and goes; a slow cut does not feel it.
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
         grid_shift: Position of the grid against the scene along x, y, z [cells].
         grid_turn: Angle of food and blade against the grid [rad].
@@ -89,6 +91,7 @@ class Numerics:
     crack_ties: float = 3.0
     layer_rows: int = 8
     least_gap: float = 0.02
+    damper_mass: float = 0.0
     grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
     grid_turn: float = 0.0
     mirror: bool = True
@@ -115,6 +118,7 @@ class Numerics:
         check_number(w, "crack_ties", self.crack_ties, 0.5 * (1 - 1e-9), 50.0, "ties")
         check_number(w, "extension", self.extension, -1e-300, 0.25, "of the mass inside")
         check_number(w, "edge_band", self.edge_band, 0.01, 5.0, "cells")
+        check_number(w, "damper_mass", self.damper_mass, -1e-300, 2.0, "of a particle's")
         check_number(w, "least_gap", self.least_gap, 1e-6, 0.2, "cells")
         if not isinstance(self.layer_rows, int) or not 1 <= self.layer_rows <= 64:
             raise SceneError(f"numerics: layer_rows {self.layer_rows!r} must be a whole number from 1 to 64")

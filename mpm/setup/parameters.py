@@ -11,7 +11,7 @@ from mpm.discretisation.particles import Seeds
 from mpm.scene import BAND_CELLS, Press, Scene
 from mpm.scene.material import SKIN_POISSON, Material
 from mpm.scene.shapes import section_area
-from mpm.setup.stable_step import contact_stiffness, retardation_time
+from mpm.setup.stable_step import contact_stiffness, damper_rate, retardation_time
 from mpm.state import tables as row
 
 ENDLESS = 1e3  # thickness of a wedge that never becomes a plate with parallel faces [m]
@@ -52,6 +52,7 @@ def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Se
     table[row.MU], table[row.LAM] = material.shear, material.lame
     table[row.YIELD] = min(material.yield_stress, UNBOUNDED)
     table[row.RELAXING_BULK] = material.relaxing_bulk
+    table[row.DAMPER_MASS], table[row.DAMPER_RATE] = scene.numerics.damper_mass, damper_rate(scene, material)
     table[row.MASS], table[row.VOLUME] = material.rho * seeds.volume, seeds.volume
     if material.strength is not None and material.fracture_energy is not None:
         eps0 = material.strength / material.E

@@ -19,6 +19,11 @@ def retardation_time(scene: Scene, material: Material) -> float:
     return material.loss_factor * 4 * scene.food.shape.height / (2 * math.pi * material.p_wave)
 
 
+def damper_rate(scene: Scene, material: Material) -> float:
+    """Angular frequency of the first shear mode c_s/(4 height) [1/s], at which the dampers take most."""
+    return 2 * math.pi * math.sqrt(material.shear / material.rho) / (4 * scene.food.shape.height)
+
+
 def contact_stiffness(scene: Scene, material: Material, spacing: float) -> float:
     """Stiffness of the contact over the mass of a particle [1/s^2]: ``numerics.contact_stiffness`` layers of particles.
 

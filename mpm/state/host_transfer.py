@@ -150,7 +150,7 @@ def _write(
         s.board_gap[c, p], s.tool_gap[c, p], s.volume_ratio[c, p] = row[BOARD_GAP], row[TOOL_GAP], row[VOLUME_RATIO]
         s.surface_volume[c, p] = ti.Vector([row[SURFACE_VOLUME], row[SURFACE_VOLUME + 1]])
         s.adhering[c, p] = ti.cast(row[ADHERING], ti.i32)
-        s.v[c, p] = ti.Vector.zero(float, 3)
+        s.v[c, p], s.damper_v[c, p] = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
         s.side[c, p] = 0
         s.visibility[c, p] = 0
         for b in ti.static(range(2)):

@@ -99,6 +99,7 @@ class State:
     Attributes:
         x: Positions of the particles in the grid's axes [m], (cut, particle).
         v: Velocities [m/s], (cut, particle).
+        damper_v: Velocities of their dampers [m/s], (cut, particle).
         C: Velocity gradients [1/s], (cut, particle, column).
         F: Deformation gradients [-], (cut, block, 3 row + column) of lanes.
         tau: Kirchhoff stress [Pa], losses and stretch (:mod:`mpm.state.tables`), (cut, block, entry) of lanes.
@@ -251,7 +252,7 @@ class State:
         vec3, vec4, mat3 = ti.types.vector(3, real), ti.types.vector(4, real), ti.types.matrix(3, 3, real)
         batch, room, branches = self.batch, self.room, max(self.branches, 1)
         worn, aged = room if damage else 1, room if self.branches else 1
-        self.x, self.v = (vec3.field(shape=(batch, room)) for _ in range(2))
+        self.x, self.v, self.damper_v = (vec3.field(shape=(batch, room)) for _ in range(3))
         self.C, self.F = vec4.field(shape=(batch, room, 3)), ti.Vector.field(self.lanes, real, (batch, self.blocks, 9))
         self.tau = ti.Vector.field(self.lanes, real, (batch, self.blocks, N_STRESS))
         self.side, self.tool_gap = ti.field(ti.i32, (batch, room)), ti.field(real, (batch, room))

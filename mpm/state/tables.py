@@ -17,8 +17,8 @@ SPACING, TIE_OPENING, CONTACT, LAYERED = range(37, 41)
 EDGE_BAND, LEAST_GAP = range(41, 43)
 SKIN_STIFFNESS, SKIN_POISSON, WIDTH_OF_FORCE, ZONE_MOST, LEAST_WIDTH, LOCAL_DENT = range(43, 49)
 EXTENSION, DENT_WIDTH, RELAXING_BULK, BOARD_SUCTION = range(49, 53)
-BOW, FOOD_MIDDLE, FOOD_REACH = range(53, 56)
-N_PARAMETERS = 56
+BOW, FOOD_MIDDLE, FOOD_REACH, DAMPER_MASS, DAMPER_RATE = range(53, 58)
+N_PARAMETERS = 58
 
 # Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the node plane
 # along y that is nearest to y = 0, the first and last + 1 node plane along y whose nodes have a second field, how far
@@ -48,9 +48,10 @@ SUCTION_WORK = 19
 N_SUMS = 20
 N_LOSSES = 5  # rows from PLASTIC to OUTSIDE, which are sums over particles
 
-# Rows of the sums over all particles at an output: momentum (three), kinetic and elastic energy.
-MOMENTUM, KINETIC, ELASTIC = 0, 3, 4
-N_PARTICLE_SUMS = 5
+# Rows of the sums over all particles at an output: momentum (three), kinetic and elastic energy, momentum of their
+# dampers (three).
+MOMENTUM, KINETIC, ELASTIC, DAMPER_MOMENTUM = 0, 3, 4, 5
+N_PARTICLE_SUMS = 8
 
 # Rows of the tool's pose: height of the edge in the middle of the blade, its middle along the blade, their velocities,
 # the height that is commanded, the vertical impulse booked before this step; the edge's angle to the board, how fast

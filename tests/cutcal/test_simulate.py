@@ -198,7 +198,7 @@ def test_simulate_has_an_option_for_each_constant(tmp_path: Path, capsys):
     constants = valid(json.loads(capsys.readouterr().out))["constants"]
     assert constants.pop("loss_factor") > 0 and constants == {
         "edge_band": 0.4, "extension": 0.05, "crack_ties": 0.0, "layer_rows": 0.0, "least_gap": 0.01,
-        "cohesive_zone": 0.0,
+        "damper_mass": 0.4, "cohesive_zone": 0.0,
         "board_friction": 0.8, "board_suction": 0.0, "zone": 0.004, "bearing": 1.25, "slip": 0.002,
         "contact_stiffness": 3.0, "safety": 0.5,
     }  # fmt: skip

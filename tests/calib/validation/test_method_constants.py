@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import pytest
@@ -65,6 +65,7 @@ def test_a_constant_of_the_numerics_reaches_the_kernels(constant):
     """Each changes what the kernels read, or the time step."""
 
     fruit = PRISM.with_material(R_rind=100.0, rind_thickness=2e-3, **SHARP)
+    fruit = replace(fruit, numerics=replace(fruit.numerics, damper_mass=0.4))
 
     def read(scene: Scene) -> tuple[float, ...]:
         setup = Setup(scene, Runtime(threads=1))

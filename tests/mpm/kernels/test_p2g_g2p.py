@@ -14,23 +14,24 @@ from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from mpm.state import tables as kn
 from mpm.state.host_transfer import fill, of_particles, particles, set_velocity_gradients, velocity_gradients
+from mpm.state.tables import parts_of_report
 
 DX = 3e-3
 KNIFE = Knife("thin", 1e-3, 0.1, 0.04, 0.2)
 MATERIAL = Material(E=2e5, nu=0.0, rho=1000.0)
 
 
-def scene(shape: Shape, material: Material = MATERIAL, gravity: float = 0.0) -> Scene:
+def scene(shape: Shape, material: Material = MATERIAL, gravity: float = 0.0, damper_mass: float = 0.0) -> Scene:
     """A block with the knife far above it."""
-    numerics = Numerics(dx=DX, gravity=gravity, mirror=False)
+    numerics = Numerics(dx=DX, gravity=gravity, mirror=False, damper_mass=damper_mass)
     return Scene(Food(shape, material), KNIFE, Motion(5e-3), Board(mu=0.0), numerics=numerics)
 
 
 class Free:
     """A body away from all tools, driven step by step."""
 
-    def __init__(self, shape: Shape, gravity: float = 0.0) -> None:
-        self.sim = Simulation(scene(shape, gravity=gravity), Runtime(threads=1))
+    def __init__(self, shape: Shape, gravity: float = 0.0, damper_mass: float = 0.0) -> None:
+        self.sim = Simulation(scene(shape, gravity=gravity, damper_mass=damper_mass), Runtime(threads=1))
         self.k, self.dt, self.x0 = self.sim.state, self.sim.setup.time_step(MATERIAL), self.sim.setup.seeds.x
         self.load()
 
@@ -113,6 +114,24 @@ def test_free_fall_is_exact():
     body.advance(n)
     fall = body.x0.mean(0) - of_particles(body.k, body.k.x).mean(0)
     np.testing.assert_allclose(fall, [0, 0, 9.81 * body.dt**2 * n * (n + 1) / 2], atol=1e-15)
+
+
+def test_dampers_of_a_thrown_block_take_their_part_of_its_momentum():
+    """They lag behind by 1/(1 + k) a step, k = (1 + m) w dt with w of the first shear mode, until all move alike; the
+    momentum of both is kept, and the energy that is lost is what is booked."""
+    shape, m, thrown, n = Shape("block", 0.03, 0.024, 0.02), 0.4, np.array([0.1, -0.3, 0.2]), 60
+    body = Free(shape, damper_mass=m)
+    body.start(np.broadcast_to(thrown, body.x0.shape), np.zeros((3, 3)))
+    before, _, mass = body.momenta()
+    rows = body.advance(n)
+    after, report = body.momenta()[0], parts_of_report(rows[-1])
+    k = (1 + m) * 2 * np.pi * np.sqrt(1e5 / 1000.0) / (4 * 0.02) * body.dt
+    np.testing.assert_allclose(after, before * (1 + m * (1 + k) ** -n) / (1 + m), rtol=1e-10)
+    dampers = report.particles[kn.DAMPER_MOMENTUM : kn.DAMPER_MOMENTUM + 3]
+    np.testing.assert_allclose(after + dampers, before, rtol=1e-12)
+    booked = rows[:, kn.VISCOUS].sum() * body.sim.setup.seeds.volume
+    assert booked > 0.1 * report.particles[kn.KINETIC]
+    assert report.particles[kn.KINETIC] + booked == pytest.approx(before @ before / (2 * mass), rel=1e-10)
 
 
 @pytest.mark.slow
