@@ -20,6 +20,15 @@ def _seed() -> None:
 
 
 @pytest.fixture(autouse=True, scope="session")
+def _no_waiting_for_disks() -> Iterator[None]:
+    """What is written is not waited for to be on the disk: thousands of times some milliseconds, and no test cuts the
+    power."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda file: None)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
 def _kept_states() -> Iterator[None]:
     """Keep the fields of more scenes than a process of its own does, and give them more room: tests take turns with
     some dozen sizes of them, and kernels are compiled anew, for many seconds, for each size and where fields are made

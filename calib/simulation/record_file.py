@@ -143,6 +143,7 @@ def _read(path: Path, key: str) -> ForceRecord | None:
             for name in (COHESION, ADHESION, SUCTION):
                 found.setdefault(name, None)
             found.setdefault("slowed", False)
+            found.setdefault("dampers", np.zeros_like(found["momentum"]))
             found.setdefault("rows_down", None)
             values = {f.name: found[f.name] for f in fields(ForceRecord)}
             values |= {name: json.loads(values[name]) for name in JSON_FIELDS}

@@ -48,7 +48,7 @@ def cut(scene: Scene) -> ForceRecord:
             name: zero
             for name in ("slide", "kinetic", "elastic", "plastic", "damage", "viscous", "friction", "moment", "tilt")
         },
-        **{name: nothing for name in ("board", "gravity", "momentum", "residual")},
+        **{name: nothing for name in ("board", "gravity", "momentum", "dampers", "residual")},
         edge=edge[:, None] * up,
         face=face[:, None] * up,
         parting=np.cumsum((edge + face) * path[0]),

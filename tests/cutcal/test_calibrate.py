@@ -27,6 +27,7 @@ from tests.data_dir import ROOT
 TRACE = ROOT / "force_data" / "banana_reconstructed.csv"
 # A coarse grid and two parameters: seconds a simulation, enough to pass through every stage.
 SMALL = ["--food", "banana", "--trace", str(TRACE), "--fit", "E,R", "--dx", "5e-3", "--budget", "14"]
+SMALL += ["--workers", "1"]  # a second one would compile the same kernels beside the other tests
 pytestmark = pytest.mark.slow
 PATIENCE_S = 400.0  # for the first stored runs, kernels compiled by two processes on a loaded machine included
 

@@ -13,7 +13,7 @@ from cutcal.main import main
 from tests.calib.documents import valid
 
 SMALL = ["converge", "--food", "banana", "--stroke", "4e-3", "--repeats", "1", "--dx", "6e-3,4.5e-3", "--mach", "0.02"]
-SMALL += ["--numerics"]
+SMALL += ["--numerics", "--workers", "1"]
 
 
 @pytest.fixture(scope="module")

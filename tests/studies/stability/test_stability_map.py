@@ -40,7 +40,7 @@ def record(**changes):
     zero, up = np.zeros(ROWS), np.tile([0.0, 0.0, 1.0], (ROWS, 1))
     stroke = np.linspace(0.25e-3, 0.01, ROWS)
     values = dict.fromkeys(("slide", "kinetic", "damage", "viscous", "friction", "parting", "moment", "tilt"), zero)
-    values |= dict.fromkeys(("face", "momentum", "residual"), 0 * up)
+    values |= dict.fromkeys(("face", "momentum", "dampers", "residual"), 0 * up)
     values |= {"stroke": stroke, "command": stroke, "time": stroke / 0.1, "edge": up, "board": -up}
     values |= {
         "mass": WEIGHT / 9.81,
