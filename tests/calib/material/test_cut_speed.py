@@ -58,7 +58,7 @@ def test_halves_do_not_chatter() -> None:
 
 @pytest.mark.slow
 def test_a_cucumber_on_its_ends_hardly_feels_half_the_speed_of_its_screening() -> None:
-    """By 4.9 % of the peak, root mean square; at twice that speed by 11 %, for it has no time to bend."""
+    """By 4.0 % of the peak, root mean square; at twice that speed by 14 %, for it has no time to bend."""
     flesh = {"E": 8.1e6, "yield_stress": 4.3e5, "R": 115.0, "mu": 0.045, "board_friction": 0.4, "bow": 3.5e-4}
     rind = {"R_rind": 280.0, "rind_thickness": 1.7e-3, "rind_stiffness": 3.2, "R_skin": 245.0}
     core = {"R_core": 27.0, "core_ratio": 0.63, "core_stiffness": 0.24}
@@ -70,3 +70,4 @@ def test_a_cucumber_on_its_ends_hardly_feels_half_the_speed_of_its_screening() -
     stroke = np.linspace(0.0, usual.stroke[-1], 200)
     away = np.interp(stroke, usual.stroke, usual.resolved) - np.interp(stroke, slow.stroke, slow.resolved)
     assert np.sqrt(np.mean(away**2)) < 0.07 * slow.peak
+    assert max(usual.momentum_residual, slow.momentum_residual) < 1e-10  # a board with a bow takes its part
