@@ -25,7 +25,7 @@ def drag_damper(s: ti.template(), cut, p, u, dt):
         Its velocity then [m/s], and the energy that the dashpot takes over the food's reference volume [J/m^3], times
         the volume of the particle over that of one beside the cut.
     """
-    share = s.par[cut, DAMPER_MASS] / (1.0 + s.par[cut, DAMPER_MASS])  # of the relative velocity that the particle bears
+    share = s.par[cut, DAMPER_MASS] / (1.0 + s.par[cut, DAMPER_MASS])  # that the particle bears
     follows = (1.0 + s.par[cut, DAMPER_MASS]) * s.par[cut, DAMPER_RATE] * dt
     apart = u - s.damper_v[cut, p]
     lost = follows / (1.0 + follows) * apart
