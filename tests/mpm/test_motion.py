@@ -66,7 +66,7 @@ def test_tilted_edge_needs_the_same_work_per_area():
 @pytest.mark.slow
 @pytest.mark.parametrize("turn", [pytest.param(15.0, marks=pytest.mark.long), 45.0])
 def test_grid_may_lie_at_any_angle(turn):
-    """Food and blade turned against the grid: peak and work as on it, within 2 %; momentum is balanced, dampers included."""
+    """Food and blade turned against the grid: peak and work as on it, within 2 %; momentum balances, with dampers."""
     damped = replace(PRISM, numerics=replace(PRISM.numerics, damper_mass=0.4))
     straight = cut(damped)
     turned = cut(replace(damped, numerics=replace(damped.numerics, grid_turn=np.deg2rad(turn))))
