@@ -82,6 +82,8 @@ def test_numerical_choices_are_checked(finished):
         "twice the nodes that follow",
         "half the least gap to a surface",
         "twice the least gap to a surface",
+        "half the mass of the dampers",
+        "twice the mass of the dampers",
         "half the friction of the board",
         "twice the friction of the board",
         "half the time step",

@@ -22,6 +22,7 @@ FLESH = replace(scenes.FLESH, loss_factor=0.1)
 PRISM = replace(scenes.PRISM, food=replace(scenes.PRISM.food, material=FLESH))
 # rough board, wide and low: or the food slides along with the blade, or tips over
 HELD = replace(PRISM, food=Food(Shape("block", 0.03, 0.072, 0.024), FLESH), board=Board(mu=9.0))
+HELD = replace(HELD, numerics=replace(HELD.numerics, damper_mass=0.4))
 R_W = 300 * 0.072
 
 
@@ -43,9 +44,9 @@ def sliding() -> Simulation:
 def test_slicing_lowers_the_push_as_atkins_says(sliding, xi):
     """Frictionless: V/(R w) = 1/(1 + xi^2) and H/(R w) = xi/(1 + xi^2) (Atkins, Xu and Jeronimidis 2004), within 3 %.
 
-    At half the usual Mach number: the food swings sideways when a blade at twice its speed sets off along it.
+    With dampers: the food swings sideways when a blade at twice its speed sets off along it.
     """
-    motion = replace(PRISM.motion, slice_ratio=max(xi, 1e-9), mach=0.005)  # a ratio of 0 would be mirrored
+    motion = replace(PRISM.motion, slice_ratio=max(xi, 1e-9))  # a ratio of 0 would be mirrored
     sliding.setup.scene = replace(HELD, motion=motion)
     record = sliding.run()
     push, pull = (between(record, record.edge[:, axis], 11e-3, 16e-3) for axis in (2, 0))
