@@ -111,7 +111,7 @@ CONSTANTS = (
     ),
     MethodConstant(
         "mass of the dampers", "numerics", "damper_mass", (0.5, 2.0),
-        "numerical: enough that halves which rub do not chatter; with it they lose about as much as tissue",
+        "numerical: halves which rub do not chatter, and from here on the work no longer depends on it",
     ),
     MethodConstant(
         "process zone of a food without strength", "material", "cohesive_zone", (0.5, 2.0),

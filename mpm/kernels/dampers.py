@@ -22,23 +22,22 @@ def drag_damper(s: ti.template(), cut, p, u, dt):
         dt: Time step [s].
 
     Returns:
-        Its velocity then [m/s], and the energy that the dashpot takes over the food's reference volume [J/m^3], times
-        the volume of the particle over that of one beside the cut.
+        Its velocity then [m/s], and the energy that the dashpot takes, over the mass of a particle beside the cut
+        [J/kg].
     """
     share = s.par[cut, DAMPER_MASS] / (1.0 + s.par[cut, DAMPER_MASS])  # that the particle bears
     follows = (1.0 + s.par[cut, DAMPER_MASS]) * s.par[cut, DAMPER_RATE] * dt
     apart = u - s.damper_v[cut, p]
     lost = follows / (1.0 + follows) * apart
     s.damper_v[cut, p] += (1.0 - share) * lost
-    energy = 0.5 * share * lost.dot(2.0 * apart - lost)
-    return u - share * lost, s.par[cut, MASS] / s.par[cut, VOLUME] * s.volume_ratio[cut, p] * energy
+    return u - share * lost, 0.5 * s.volume_ratio[cut, p] * share * lost.dot(2.0 * apart - lost)
 
 
 @ti.func
 def book_dampers(s: ti.template(), cut, part, taken):
-    """Book what the dampers of a part of the particles have taken, beside what the loss factor takes."""
+    """Book what the dampers of a part of the particles take [J/kg], beside what the loss factor takes [J/m^3]."""
     if s.par[cut, DAMPER_MASS] > 0:
-        s.losses[cut, part % s.copies, VISCOUS - PLASTIC] += taken
+        s.losses[cut, part % s.copies, VISCOUS - PLASTIC] += s.par[cut, MASS] / s.par[cut, VOLUME] * taken
 
 
 @ti.func

@@ -47,7 +47,8 @@ class ForceRecord:
         momentum: Momentum of the food at the end of each interval [N s], shape (n, 3).
         dampers: Momentum of its dampers at the end of each interval [N s], shape (n, 3).
         residual: Momentum balance that does not close [N], shape (n, 3).
-        kinetic: Kinetic energy of the motion, dampers included, without what contact gave last [J], shape (n,).
+        kinetic: Kinetic energy of the motion, dampers included, without what contact gave in the last step [J], shape
+            (n,).
         elastic: Elastic energy [J], shape (n,).
         plastic: Energy dissipated by J2 flow so far [J], shape (n,).
         damage: Energy dissipated by bulk damage so far [J], shape (n,).
